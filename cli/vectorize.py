@@ -135,7 +135,7 @@ def single(
     if not request.quiet:
         echo_notes(image, settings, result, verbose=request.verbose)
     if as_uri:
-        from warpsplat.svg.uri import data_uri
+        from warpsplat.svg.numbers import data_uri
 
         echo(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": request.device, **result.as_dict()}

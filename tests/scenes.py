@@ -41,18 +41,9 @@ def random_scene(
     usual = {CUBIC: (FILL_CUBICS, STROKE_CUBICS), SPLINE: (FILL_QUADRATICS, STROKE_QUADRATICS)}
     beziers = beziers or usual[basis][kind == Kind.STROKE]
     points = outlines(rng, centre, point_count(kind, basis, beziers))
-    colors = rng.uniform(0.05, 0.95, (count, 3))
-    opacities = rng.uniform(0.4, 0.95, count)
-    widths = rng.uniform(1.5, 7, count) if kind == Kind.STROKE else np.zeros(count)
-    return Scene.uniform(
-        kind,
-        canvas(width, height),
-        points.astype(np.float32),
-        basis,
-        colors=colors.astype(np.float32),
-        opacities=opacities.astype(np.float32),
-        widths=widths.astype(np.float32),
-    )
+    values = {"colors": rng.uniform(0.05, 0.95, (count, 3)), "opacities": rng.uniform(0.4, 0.95, count)}
+    values["widths"] = rng.uniform(1.5, 7, count) if kind == Kind.STROKE else np.zeros(count)
+    return Scene.uniform(kind, canvas(width, height), points, basis, **values)
 
 
 def point_count(kind: Kind, basis: Basis, beziers: int) -> int:
@@ -81,36 +72,23 @@ Outline = tuple[Kind, Basis, int]
 
 def ragged_scene(shapes: Sequence[Outline], width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
     """Return a random shape for each outline, the first one at the back."""
-    scene = random_scene(Kind.FILL, 0, width, height)
-    for i, (kind, basis, beziers) in enumerate(shapes):
-        one = random_scene(kind, 1, width, height, seed=100 * seed + i, basis=basis, beziers=beziers)
-        scene = scene.append(one)
-    return scene
+    scenes = [
+        random_scene(kind, 1, width, height, seed=100 * seed + i, basis=basis, beziers=beziers)
+        for i, (kind, basis, beziers) in enumerate(shapes)
+    ]
+    return functools.reduce(Scene.append, scenes)
 
 
+FILL, STROKE = Kind.FILL, Kind.STROKE
 MIXED_CUBICS: tuple[Outline, ...] = (
-    (Kind.FILL, CUBIC, 4),
-    (Kind.STROKE, CUBIC, 3),
-    (Kind.STROKE, CUBIC, 1),
-    (Kind.FILL, CUBIC, 2),
-    (Kind.STROKE, CUBIC, 5),
-    (Kind.FILL, CUBIC, 6),
-    (Kind.STROKE, CUBIC, 2),
-    (Kind.FILL, CUBIC, 4),
+    *((FILL, CUBIC, 4), (STROKE, CUBIC, 3), (STROKE, CUBIC, 1), (FILL, CUBIC, 2)),
+    *((STROKE, CUBIC, 5), (FILL, CUBIC, 6), (STROKE, CUBIC, 2), (FILL, CUBIC, 4)),
 )
 """Fills and strokes of different numbers of cubics, even ones for fills, as splats need."""
 
 MIXED: tuple[Outline, ...] = (
-    (Kind.FILL, SPLINE, 12),
-    (Kind.STROKE, CUBIC, 3),
-    (Kind.STROKE, SPLINE, 1),
-    (Kind.FILL, CUBIC, 3),
-    (Kind.FILL, SPLINE, 3),
-    (Kind.STROKE, SPLINE, 6),
-    (Kind.STROKE, CUBIC, 1),
-    (Kind.FILL, CUBIC, 4),
-    (Kind.FILL, SPLINE, 7),
-    (Kind.STROKE, SPLINE, 2),
+    *((FILL, SPLINE, 12), (STROKE, CUBIC, 3), (STROKE, SPLINE, 1), (FILL, CUBIC, 3), (FILL, SPLINE, 3)),
+    *((STROKE, SPLINE, 6), (STROKE, CUBIC, 1), (FILL, CUBIC, 4), (FILL, SPLINE, 7), (STROKE, SPLINE, 2)),
 )
 """Fills and strokes of both bases, from the fewest points on."""
 
@@ -131,7 +109,7 @@ def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> S
         points = [part.points - part.points.mean(axis=0) + [12 + 8 * i, 18] for part in parts]
         counts = [len(own) for own in points]
         shapes.append(
-            Scene.of(
+            Scene(
                 canvas(40, 36),
                 np.array([kind], np.int32),
                 np.array([0, sum(counts)], np.int32),
@@ -173,12 +151,7 @@ def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:
     )
 
 
-def with_two_stops(scene: Scene, *, seed: int = 0) -> Scene:
-    """Give every shape but the last a padded gradient of two stops, linear and radial in turn."""
-    return with_stops(scene, (0.1, 0.8), seed=seed)
-
-
-def with_stops(scene: Scene, offsets: Sequence[float], *, seed: int = 0) -> Scene:
+def with_stops(scene: Scene, offsets: Sequence[float] = (0.1, 0.8), *, seed: int = 0) -> Scene:
     """Give each shape but the last a padded gradient with stops at ``offsets``, linear or radial in turn."""
     scene = with_gradients(scene, seed=seed)
     rng = np.random.default_rng(seed)
@@ -243,9 +216,9 @@ def disc(radius: float, size: int, centre: float, cubics: int = FILL_CUBICS) -> 
     return Scene.uniform(
         Kind.FILL,
         Canvas(size, size, np.zeros(3, np.float32)),
-        (np.array(points)[None] * radius + centre).astype(np.float32),
-        colors=np.ones((1, 3), np.float32),
-        opacities=np.ones(1, np.float32),
+        np.array(points)[None] * radius + centre,
+        colors=np.ones((1, 3)),
+        opacities=np.ones(1),
     )
 
 
@@ -260,7 +233,11 @@ DASHES = (
 
 def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, limit: float = 4.0) -> Scene:
     """Return strokes of several contours, closed and open, smooth and with corners."""
-    scene = contours_scene(Kind.STROKE, seed=seed)
+    return styled(replace(contours_scene(Kind.STROKE, seed=seed), dashes=DASHES), cap, join, limit, dash)
+
+
+def styled(scene: Scene, cap: Cap, join: Join, limit: float, dash: int) -> Scene:
+    """Return strokes with these styles."""
     count = len(scene)
     return replace(
         scene,
@@ -268,7 +245,6 @@ def styled_scene(cap: Cap, join: Join, dash: int = NO_DASHES, *, seed: int = 0, 
         join=np.full(count, join, np.int32),
         miter_limits=np.full(count, limit, np.float32),
         dash=np.full(count, dash, np.int32),
-        dashes=DASHES,
     )
 
 
@@ -290,7 +266,7 @@ def polyline_scene(
         sides = [a + (b - a) * t for a, b in itertools.pairwise(ring) for t in (0, 1 / 3, 2 / 3)]
         points.append(np.array(sides if closed else [*sides, ring[-1]]))
     counts = np.array([len(own) for own in points])
-    return Scene.of(
+    scene = Scene(
         Canvas(*size, np.zeros(3, np.float32)),
         np.array([Kind.STROKE], np.int32),
         np.array([0, counts.sum()], np.int32),
@@ -300,9 +276,6 @@ def polyline_scene(
         colors=np.ones((1, 3), np.float32),
         opacities=np.ones(1, np.float32),
         widths=np.array([width], np.float32),
-        cap=np.array([cap], np.int32),
-        join=np.array([join], np.int32),
-        miter_limits=np.array([miter_limits], np.float32),
-        dash=np.array([dash], np.int32),
         dashes=dashes,
     )
+    return styled(scene, cap, join, miter_limits, dash)

@@ -13,8 +13,7 @@ from warpsplat.errors import ImageError
 from warpsplat.svg.document import Document, Element
 from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept, load_scene
 
 LONG = 1_000_000
 SPACES, DIGITS = " " * LONG, "1" * LONG

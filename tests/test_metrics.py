@@ -16,7 +16,7 @@ from tests.scenes import random_scene
 from warpsplat.errors import Stopped
 from warpsplat.metrics import SSIMULACRA2_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
 from warpsplat.scene import Kind
-from warpsplat.svg import strips
+from warpsplat.svg import viewer
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
@@ -99,22 +99,22 @@ def test_score_in_strips_is_that_of_whole_images(monkeypatch: pytest.MonkeyPatch
     # In strips this thin, edges move a little.
     cases = ((1 << 20, 1 << 22, 1e-4), (371 * 20, 1 << 22, 1e-4), (371 * 20, 0, 5e-3))
     for strip, whole, tolerance in cases:
-        monkeypatch.setattr(strips, "STRIP_PIXELS", strip)
-        monkeypatch.setattr(strips, "WHOLE_PIXELS", whole)
+        monkeypatch.setattr(viewer, "STRIP_PIXELS", strip)
+        monkeypatch.setattr(viewer, "WHOLE_PIXELS", whole)
         score = score_svg(text, target, eyes=False)
         np.testing.assert_allclose([score.psnr, score.ssim, score.ms_ssim], want, atol=tolerance)
 
 
 def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     text, _ = scored_scene()
-    whole = strips.draw(text, 371, 357)
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 50)
-    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
-    in_strips = strips.draw(text, 371, 357)
+    whole = viewer.draw(text, 371, 357)
+    monkeypatch.setattr(viewer, "STRIP_PIXELS", 371 * 50)
+    monkeypatch.setattr(viewer, "WHOLE_PIXELS", 0)
+    in_strips = viewer.draw(text, 371, 357)
     assert np.abs(in_strips.astype(int) - whole).mean() < 0.01
     # Another program's units need not be pixels: its files are drawn in one piece.
     foreign = text.replace("<!--warpsplat", "<!--another")
-    np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
+    np.testing.assert_array_equal(viewer.draw(foreign, 371, 357), whole)
 
 
 @pytest.mark.parametrize("per_pixel", [0.5, 1.0, 5.0, 32.0])
@@ -122,10 +122,10 @@ def test_strips_of_any_view_box(per_pixel: float, monkeypatch: pytest.MonkeyPatc
     """Strips begin where they should for any units: a tenth of a row would be visible."""
     scene = random_scene(Kind.FILL, count=40, width=91, height=157)
     text = write_svg(scene, per_pixel=per_pixel)
-    whole = strips.draw(text, 91, 157).astype(int)
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 91 * 20)
-    monkeypatch.setattr(strips, "WHOLE_PIXELS", 91 * 157 - 1)
-    in_strips = strips.draw(text, 91, 157, own=True).astype(int)
+    whole = viewer.draw(text, 91, 157).astype(int)
+    monkeypatch.setattr(viewer, "STRIP_PIXELS", 91 * 20)
+    monkeypatch.setattr(viewer, "WHOLE_PIXELS", 91 * 157 - 1)
+    in_strips = viewer.draw(text, 91, 157, own=True).astype(int)
     row = np.abs(np.roll(whole, 1, axis=0) - whole).mean()
     assert np.abs(in_strips - whole).mean() < 0.025 * row
     assert np.abs(in_strips - whole).max() <= 32
@@ -141,8 +141,8 @@ def test_transparent_files_are_scored_on_white() -> None:
 def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scoring stops at every stage: before drawing, between strips, between the strips of the figures."""
     text, target = scored_scene()
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 100)
-    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
+    monkeypatch.setattr(viewer, "STRIP_PIXELS", 371 * 100)
+    monkeypatch.setattr(viewer, "WHOLE_PIXELS", 0)
     asked = 0
 
     def count() -> bool:
@@ -229,7 +229,7 @@ def test_strips_make_the_figures_of_the_whole(
     whole = score_svg(text, target, own=True, eyes=False)
     monkeypatch.setattr("warpsplat.metrics.WHOLE_PIXELS", 0)
     monkeypatch.setattr("warpsplat.metrics.STRIP_PIXELS", 640)
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 640)
+    monkeypatch.setattr(viewer, "STRIP_PIXELS", 640)
     pieces = score_svg(text, target, own=True, eyes=False)
     for name, value in whole.as_dict().items():
         assert pieces.as_dict()[name] == pytest.approx(value, abs=1e-6), name

@@ -16,7 +16,7 @@ from PIL import Image
 
 from warpsplat.portable import elementary
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.strips import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
+from warpsplat.svg.viewer import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 

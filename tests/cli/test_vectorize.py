@@ -16,7 +16,7 @@ import warpsplat
 from tests.cli.helpers import QUICK, one_line, run, shell
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
-from warpsplat.svg.uri import data_uri
+from warpsplat.svg.numbers import data_uri
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import minified
 

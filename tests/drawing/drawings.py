@@ -9,7 +9,7 @@ import numpy as np
 
 from warpsplat.fit.constraints import Drawing
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
 
 Outline = tuple[np.ndarray, list[Joint]]
@@ -89,7 +89,7 @@ def drawing(
         moved[members] += rng.normal(0, spread, 2) if spread else 0
         if len(set(owner[members])) > 1:
             same[members] = number
-    scene = Scene.of(
+    scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
         starts_of(np.bincount(owner, minlength=len(shapes))),

@@ -18,7 +18,7 @@ from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray, Scene
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 
 QUICK = Refinement(steps=60, point_rate=0.4)
 

@@ -31,7 +31,7 @@ from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import Canvas
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded, write_svg
 

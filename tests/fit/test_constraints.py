@@ -11,7 +11,7 @@ from warpsplat.fit.constraints import AFTER, BEFORE, Constraints, Drawing, Proje
 from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 
 DRAWINGS = pytest.mark.parametrize("made", [logo(), seam()], ids=["logo", "seam"])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import step_for
-from tests.scenes import random_scene, with_two_stops
+from tests.scenes import random_scene, with_stops
 from warpsplat.fit.paints import with_ramps, without_gradients
 from warpsplat.fit.ramps import Ramps, RampSolver
 from warpsplat.rendering.backend import Backend
@@ -111,7 +111,7 @@ def test_gains_are_decreases_of_the_error(device: str, clear: bool) -> None:
 
 
 def test_flattening_increases_the_error_as_predicted(device: str) -> None:
-    scene = with_two_stops(random_scene(Kind.FILL, 5, SIZE, SIZE, seed=3), seed=4)
+    scene = with_stops(random_scene(Kind.FILL, 5, SIZE, SIZE, seed=3), seed=4)
     scene.stop_opacities[:] = 1
     target = np.random.default_rng(0).uniform(0.3, 0.7, (SIZE, SIZE, 3)).astype(np.float32)
     solver = solver_of(scene, target, device)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import compare, renderer_for
-from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_stops, with_two_stops
+from tests.scenes import disc, mixed_scene, random_scene, with_gradients, with_stops
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, Kind, Paint, Scene, Spread
 
@@ -42,7 +42,7 @@ def test_spread(device: str, paint: Paint, spread: Spread) -> None:
 @pytest.mark.parametrize("clear", [False, True])
 def test_ramps(device: str, lanes: int, clear: bool) -> None:
     """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
-    scene = with_two_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
+    scene = with_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
 
 
@@ -56,7 +56,7 @@ def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[fl
 
 
 def test_what_is_seen_is_what_colours_are_multiplied_with(device: str) -> None:
-    scene = with_two_stops(mixed_scene(seed=4), seed=5)
+    scene = with_stops(mixed_scene(seed=4), seed=5)
     scene.opacities[:] = 0.6
     before = renderer_for(scene, device)
     visible = before.visible()

@@ -21,8 +21,7 @@ from warpsplat.run.refine import refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
 from warpsplat.svg.page import placed
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.viewer import on_white, premultiplied, render_svg
 from warpsplat.svg.write import write_svg
 

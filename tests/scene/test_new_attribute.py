@@ -19,7 +19,7 @@ ROW = """
 )
 """
 FIELD = '''
-    glows: FloatArray
+    glows: FloatArray = None
     """Of fills, in [0, 1], shape (shape, 3)."""
 '''
 

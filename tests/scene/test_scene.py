@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import MIXED, canvas, contours_scene, mixed_scene, random_scene, with_gradients
+from tests.scenes import canvas, contours_scene, mixed_scene, random_scene, with_gradients
 from warpsplat.scene import ATTRIBUTES, NO_DASHES, TRAITS, Basis, Cap, Kind, Rule, Scene
-
-POINTS, COLORS = (next(a for a in ATTRIBUTES if a.name == name) for name in ("points", "colors"))
 
 
 def test_arrays_must_fit() -> None:
@@ -19,43 +17,30 @@ def test_arrays_must_fit() -> None:
             replace(scene, **{attribute.name: np.concatenate([value, value[:1]])})
     with pytest.raises(ValueError, match="opacities"):
         replace(scene, opacities=np.ones((4, 3), np.float32))
+    with pytest.raises(ValueError, match="basis has shape"):
+        replace(scene, basis=scene.basis[1:])
     with pytest.raises(ValueError, match="first does not run from 0 to 48 points in 5 numbers"):
         replace(scene, first=scene.first[:-1])
 
 
 @pytest.mark.parametrize(
-    ("kind", "count"),
-    [(Kind.FILL, 0), (Kind.FILL, 7), (Kind.FILL, 4), (Kind.STROKE, 1), (Kind.STROKE, 6), (Kind.STROKE, 12)],
+    ("basis", "kind", "counts"),
+    [(Basis.CUBIC, Kind.FILL, (0, 4, 7)), (Basis.CUBIC, Kind.STROKE, (1, 6, 12))]
+    + [(Basis.SPLINE, kind, (2,)) for kind in Kind],
 )
-def test_shapes_have_whole_cubics(kind: Kind, count: int) -> None:
-    with pytest.raises(ValueError, match=f"a {kind.name.lower()} cannot have {count} control points"):
-        Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32))
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_splines_have_three_points_at_least(kind: Kind) -> None:
-    for count in (3, 4, 5, 8):
-        scene = Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32), Basis.SPLINE)
-        assert scene.bezier_counts().tolist() == 2 * [count if kind == Kind.FILL else count - 2]
-    with pytest.raises(ValueError, match=f"a {kind.name.lower()} cannot have 2 control points"):
-        Scene.uniform(kind, canvas(9, 9), np.zeros((2, 2, 2), np.float32), Basis.SPLINE)
-
-
-def test_each_shape_has_a_basis() -> None:
-    scene = mixed_scene()
-    with pytest.raises(ValueError, match="basis has shape"):
-        replace(scene, basis=scene.basis[1:])
-    empty = Scene.of(scene.canvas, scene.kind[:0], scene.first[:1], points=scene.points[:0])
-    assert len(empty.basis) == 0
-    cubics = random_scene(Kind.FILL)
-    assert set(cubics.basis) == {Basis.CUBIC}
-    assert cubics.bezier_counts().tolist() == 4 * [4]
+def test_shapes_have_whole_curves(basis: Basis, kind: Kind, counts: tuple[int, ...]) -> None:
+    for count in counts:
+        with pytest.raises(ValueError, match=f"a {kind.name.lower()} cannot have {count} control points"):
+            Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32), basis)
+    scene = Scene.uniform(kind, canvas(9, 9), np.zeros((2, 5, 2), np.float32), Basis.SPLINE)
+    assert scene.bezier_counts().tolist() == 2 * [5 if kind == Kind.FILL else 3]
 
 
 def test_uniform_leaves_the_rest_at_0() -> None:
     points = np.arange(48, dtype=np.float32).reshape(2, 12, 2)
     scene = Scene.uniform(Kind.FILL, canvas(9, 9), points, opacities=np.array([0.5, 0.7], np.float32))
     assert scene.first.tolist() == [0, 12, 24]
+    assert set(scene.basis) == {Basis.CUBIC} and scene.bezier_counts().tolist() == [4, 4]
     np.testing.assert_array_equal(scene.points_of(1), points[1])
     np.testing.assert_array_equal(scene.opacities, np.float32([0.5, 0.7]))
     assert not scene.colors.any()
@@ -80,28 +65,6 @@ def test_take_and_append() -> None:
     empty = scene.take(np.arange(0))
     assert len(empty) == len(empty.points) == 0
     np.testing.assert_array_equal(empty.append(scene).points, scene.points)
-
-
-def test_alike_groups_every_shape_once() -> None:
-    scene = mixed_scene().append(mixed_scene(seed=1))
-    seen: list[int] = []
-    groups = list(scene.alike())
-    for kind, basis, closed, index, _, points in groups:
-        for i, own in zip(index, points, strict=True):
-            assert (scene.kind[i], scene.basis[i]) == (kind, basis)
-            assert closed == (kind == Kind.FILL)
-            np.testing.assert_array_equal(own, scene.points_of(i))
-        seen += index.tolist()
-    assert sorted(seen) == list(range(len(scene)))
-    assert len(groups) == len(set(MIXED))
-
-
-def test_rows_of_shapes() -> None:
-    scene = mixed_scene()
-    index = np.array([6, 1, 2])
-    np.testing.assert_array_equal(scene.rows(COLORS, index), index)
-    wanted = np.concatenate([np.arange(scene.first[i], scene.first[i + 1]) for i in index])
-    np.testing.assert_array_equal(scene.rows(POINTS, index), wanted)
 
 
 def test_contours_and_traits_go_with_their_shapes() -> None:

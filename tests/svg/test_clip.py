@@ -9,14 +9,6 @@ from warpsplat.svg.clip import _zeros, cut_subpath
 from warpsplat.svg.paths import cubics
 
 
-def test_sign_changes_of_cubics() -> None:
-    rng = np.random.default_rng(0)
-    for a, b, c, d in rng.uniform(-1, 1, (300, 4)):
-        roots = np.roots([d - 3 * c + 3 * b - a, 3 * (c - 2 * b + a), 3 * (b - a), a])
-        expected = sorted(t.real for t in roots if abs(t.imag) < 1e-9 and 0 < t.real < 1)
-        assert _zeros(a, b, c, d) == pytest.approx(expected, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("heights", "expected"),
     [

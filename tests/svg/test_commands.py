@@ -71,32 +71,6 @@ def test_no_other_text_is_shorter(seed: int) -> None:
     assert len(shortest(pen, chain)) == min(map(len, every_text(pen, chain)))
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_path_data_is_read_exactly(seed: int) -> None:
-    """Lines become cubics with handles at the thirds."""
-    chain = segments(seed, 30)
-    (drawn,) = cubics(shortest(None, chain), keep_dots=True)
-    want = [chain[0].start]
-    for start, handles, end in chain:
-        thirds = [tuple(np.add(start, np.subtract(end, start) * k / 3)) for k in (1, 2)]
-        want += [*(handles or thirds), end]
-    np.testing.assert_allclose(drawn.points, want, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("points", "text"),
-    [
-        ([(0, 0), (9, 0), (9, 8), (1, 8), (1, 2), (5, 1)], "M0 0h9v8H1V2l4-1"),
-        ([(5, 5), (6, 7), (8, 6)], "M5 5l1 2 2-1"),
-        ([(90, 90), (0, 7), (95, 93)], "M90 90L0 7 95 93"),
-    ],
-    ids=["level and upright", "behind a move", "absolute"],
-)
-def test_lines(points: list[Pair], text: str) -> None:
-    made = shortest(None, [Segment(a, None, b) for a, b in itertools.pairwise(points)])
-    assert len(made) == len(text)
-
-
 def test_a_ring_is_the_shortest_of_its_starts() -> None:
     chain = segments(3, 40)
     chain.append(Segment(chain[-1].end, None, chain[0].start))
@@ -187,7 +161,3 @@ def test_no_other_smooth_text_is_shorter(seed: int, count: int) -> None:
     assert len(data) == min(map(len, texts))
     shown, wanted = (cubics(text, keep_dots=True)[0].points for text in (data, texts[0]))
     np.testing.assert_allclose(shown, wanted, atol=1e-9)
-
-
-def test_absolute_smooth_commands_are_used() -> None:
-    assert any("T" in shortest_smooth(*outline(seed, 6)) for seed in range(6))

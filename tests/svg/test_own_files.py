@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.scenes import ragged_scene, random_scene, started_alike
-from tests.svg.foreign import HEAD, ROUND, SMALL
+from tests.svg.foreign import ROUND, SMALL
 from warpsplat.metrics import psnr
 from warpsplat.scene import Basis, Kind, Scene
 from warpsplat.svg.read import load_scene
@@ -137,20 +136,3 @@ def test_strokes_of_smooth_quadratics_are_splines_clamped_at_both_ends() -> None
     closed = scene_of(RING + "z", ROUND)
     np.testing.assert_allclose(closed.points, CORNERS, atol=1e-5)
     assert closed.closed.tolist() == [1]
-
-
-def test_files_of_an_older_format() -> None:
-    """Decimals of a pixel, paths that are closed, opacities of three decimals."""
-    text = (
-        f'{HEAD}width="40" height="30" viewBox="0 0 40 30">\n<metadata>warpsplat 0.1.0 key=1</metadata>\n'
-        '<rect width="40" height="30" fill="#123"/>\n'
-        '<g><path d="M5.5 4c3.1-2.4 8.2 1.5 6 5.2-2.6 4.1-9.1 1.2-6-5.2z" fill="#fa0" fill-opacity=".832"/>'
-        "</g>\n</svg>\n"
-    )
-    scene, has_background = load_scene(text, 40, 30, "a.svg")
-    assert has_background
-    assert scene.basis.tolist() == [CUBIC]
-    want = [[5.5, 4], [8.6, 1.6], [13.7, 5.5], [11.5, 9.2], [8.9, 13.3], [2.4, 10.4]]
-    np.testing.assert_allclose(scene.points, want, atol=1e-5)
-    assert scene.opacities.tolist() == pytest.approx([0.832])
-    assert re.search(r' d="M55 40c[^"z.]*"', write_svg(scene, per_pixel=10))

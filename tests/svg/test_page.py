@@ -10,7 +10,7 @@ import pytest
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.svg.page import Sheet, on_sheet, parse_page, parse_size, placed
+from warpsplat.svg.page import Sheet, on_sheet, placed, sheet_for
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
@@ -28,28 +28,21 @@ def head(text: str) -> tuple[str, ...]:
 
 
 def test_sizes_and_pages() -> None:
-    assert parse_size("200x150mm") == Sheet(200, 150)
-    assert parse_size("20 x 15 cm") == Sheet(200, 150)
-    assert parse_size("8x6", "in") == Sheet(8 * 25.4, 6 * 25.4, unit="in")
-    assert parse_page("A4", 100, 200) == Sheet(210, 297, 10)
-    assert parse_page("a4", 200, 100, 5) == Sheet(297, 210, 5)
+    assert sheet_for("200x150mm", "", "", 1, 1) == Sheet(200, 150)
+    assert sheet_for("20 x 15 cm", "", "", 1, 1) == Sheet(200, 150)
+    assert sheet_for("8x6", "", "in", 1, 1) == Sheet(8 * 25.4, 6 * 25.4, unit="in")
+    assert sheet_for("", "A4", "", 100, 200) == Sheet(210, 297, 10)
+    assert sheet_for("", "a4", "cm", 200, 100) == Sheet(297, 210, 10, "cm")
 
 
 @pytest.mark.parametrize(
-    ("size", "unit", "named"),
-    [("200", "mm", "200x150mm"), ("0x10mm", "mm", "0x10mm"), ("99999x10mm", "mm", "99999x10mm")]
-    + [("1x1", "ell", "ell")],
+    ("size", "page", "unit", "named"),
+    [("200", "", "mm", "200x150mm"), ("0x10mm", "", "", "0x10mm"), ("99999x10mm", "", "", "99999x10mm")]
+    + [("1x1", "", "ell", "ell"), ("", "b9", "", "b9"), ("", "", "ell", "ell")],
 )
-def test_invalid_sizes_are_named(size: str, unit: str, named: str) -> None:
+def test_invalid_options_are_named(size: str, page: str, unit: str, named: str) -> None:
     with pytest.raises(UsageError, match=named):
-        parse_size(size, unit)
-
-
-def test_invalid_pages_are_named() -> None:
-    with pytest.raises(UsageError, match="b9"):
-        parse_page("b9", 1, 1)
-    with pytest.raises(UsageError, match="110 mm"):
-        parse_page("a4", 1, 1, 110)
+        sheet_for(size, page, unit, 1, 1)
 
 
 def test_a_picture_is_in_the_middle_of_its_sheet() -> None:

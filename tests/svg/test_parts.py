@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from dataclasses import replace
 
@@ -10,37 +9,23 @@ import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene
-from warpsplat.scene import Basis, Canvas, Kind, Rule, Scene
-from warpsplat.scene.scene import starts_of
+from tests.svg.foreign import HEAD
+from warpsplat.scene import Kind, Scene
 from warpsplat.svg.parts import in_parts
+from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
 
-def square(x: float, y: float, side: float) -> np.ndarray:
-    """A ring of four lines as cubics."""
-    corners = np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]])
-    side_vectors = np.roll(corners, -1, axis=0) - corners
-    thirds = [corners + side_vectors * k / 3 for k in range(3)]
-    return np.stack(thirds, axis=1).reshape(-1, 2)
+def square(x: float, y: float, side: float) -> str:
+    return f"M{x} {y}h{side}v{side}h-{side}z"
 
 
-def squares(rings: list[np.ndarray], *, opacity: float = 0.5) -> Scene:
-    """One even-odd shape between two others."""
-    shapes = [[square(0, 0, 60)], rings, [square(4, 4, 20)]]
-    flat = list(itertools.chain.from_iterable(shapes))
-    return Scene.of(
-        Canvas(64, 48, np.ones(3, np.float32)),
-        np.full(3, Kind.FILL, np.int32),
-        starts_of(np.array([sum(map(len, own)) for own in shapes])),
-        np.full(3, Basis.CUBIC, np.int32),
-        starts=starts_of(np.array([len(ring) for ring in flat])),
-        closed=np.ones(len(flat), np.int32),
-        points=np.concatenate(flat).astype(np.float32),
-        colors=np.array([[0.9, 0.8, 0.2], [0, 0.2, 0.8], [1, 0, 0]], np.float32),
-        opacities=np.array([1, opacity, 0.4], np.float32),
-        rule=np.full(3, Rule.EVENODD, np.int32),
-    )
+def squares(rings: list[str]) -> Scene:
+    """One even-odd shape of translucent rings between two others."""
+    shapes = [(square(0, 0, 60), 1.0), ("".join(rings), 0.5), (square(4, 4, 20), 0.4)]
+    paths = (f'<path fill="#e80" fill-rule="evenodd" fill-opacity="{alpha}" d="{d}"/>' for d, alpha in shapes)
+    return load_scene(f'{HEAD}width="64" height="48">{"".join(paths)}</svg>', 64, 48, "a.svg")[0]
 
 
 GRID = [square(x, y, 8) for y in (2, 14, 26) for x in (2, 14, 26, 38)]
@@ -62,7 +47,7 @@ def test_a_hole_stays_with_what_is_around_it() -> None:
     scene = squares([square(2, 2, 40), square(10, 10, 8), square(50, 10, 4)])
     made = in_parts(scene, 4)
     assert np.diff(np.searchsorted(made.starts, made.first)).tolist() == [1, 2, 1, 1]
-    assert made.colors[1:3].tolist() == [scene.colors[1].tolist()] * 2
+    assert made.opacities.tolist() == [1, 0.5, 0.5, scene.opacities[2]]
 
 
 def test_contours_that_nearly_touch_or_share_a_neighbour_stay_together() -> None:

@@ -67,14 +67,10 @@ def test_time_and_memory_of_a_drawing_are_bounded(monkeypatch: pytest.MonkeyPatc
         render_svg(f'{HEAD}width="9000" height="9000">{layers}</svg>', zoom=1)
 
 
-SIDES = [
-    *("", "50", "20.5", "50%", "10em", "1cm", "10pt", "3q", "abc", " 50", "+7", ".5e1", "0.3", "50PX"),
-    "nan",
-]
-BOXES = [
-    *("", "0 0 30 20", "0,0,30,20.4", " 1 , 2 , 30 , 20 ", "0,,0 30 20", "0-5 30 20 9", "0 0 30px 20"),
-    *("0 0 0 5", "0 0 nan 5"),
-]
+SIDES = ["", "50", "20.5", "50%", "10em", "1cm", "10pt", "3q", "abc", " 50", "+7", ".5e1", "0.3", "50PX"]
+SIDES += ["nan"]
+BOXES = ["", *["0 0 30 20", "0,0,30,20.4", " 1 , 2 , 30 , 20 ", "0,,0 30 20", "0-5 30 20 9", "0 0 30px 20"]]
+BOXES += ["0 0 0 5", "0 0 nan 5"]
 SIZES = [
     *(f'width="{w}" height="{h}"' for w, h in itertools.pairwise([*SIDES, *SIDES[::2]])),
     *(f'viewBox="{box}" width="{side}"' for box, side in zip(2 * BOXES, SIDES, strict=False)),
@@ -96,20 +92,12 @@ def test_size_is_what_the_viewer_makes(attributes: str) -> None:
         assert drawn == (70, 40) or "font-size" in attributes
 
 
-SMALL_SIZE = 'width="40" height="30"'
-
-
 @pytest.mark.parametrize(
     ("attributes", "zoom"),
     [
-        ('width="192" height="4294967296"', None),
-        (f'width="{"9" * 400}" height="5"', None),
-        ('width="1e200" height="1e200"', None),
-        ('width="0" height="5"', None),
-        ('width="-4" height="5"', None),
-        ('viewBox="0 0 1e30 1e30"', None),
-        ('viewBox="0 0 1e-300 1e300"', None),
-        *((SMALL_SIZE, zoom) for zoom in (1e9, 1e308, float("inf"))),
+        *((f'width="{w}" height="5"', None) for w in ("9" * 400, "1e200", "4294967296", "0", "-4")),
+        *((f'viewBox="0 0 {box}"', None) for box in ("1e30 1e30", "1e-300 1e300")),
+        *(('width="40" height="30"', zoom) for zoom in (1e9, 1e308, float("inf"))),
     ],
 )
 def test_absurd_sizes_are_refused_before_drawing(
@@ -124,11 +112,6 @@ def test_pillows_limit_does_not_apply_to_renderings(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert render_svg(f"{SMALL}{PATH}</svg>").size == (40, 30)
     assert on_white(render_own(write_svg(disc(10, 30, 15)))).shape == (30, 30, 3)
-
-
-def test_entities_of_drawing_programs_are_read() -> None:
-    text = f'<!DOCTYPE svg [<!ENTITY c "#f00">]>{SMALL}<rect width="40" height="30" fill="&c;"/></svg>'
-    assert render_svg(text).convert("RGB").getpixel((3, 3)) == (255, 0, 0)
 
 
 @pytest.mark.parametrize("text", ["", "hello", "<html/>", "<svg/>", f"{SMALL}<g></svg>", f"{SMALL}\0</svg>"])

@@ -15,7 +15,7 @@ from tests.scenes import (
     random_scene,
     styled_scene,
     with_gradients,
-    with_two_stops,
+    with_stops,
 )
 from tests.torch.helpers import compare, compare_straight
 from warpsplat.scene import Cap, Join, Kind, Rule, Scene
@@ -39,7 +39,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "styled": lambda: styled_scene(Cap.SQUARE, Join.MITER),
     "dashed": lambda: styled_scene(Cap.BUTT, Join.BEVEL, 1),
     "gradients": lambda: with_gradients(mixed_scene(seed=2).take(np.arange(6))),
-    "ramps": lambda: with_two_stops(random_scene(Kind.FILL, 5, seed=3)),
+    "ramps": lambda: with_stops(random_scene(Kind.FILL, 5, seed=3)),
 }
 
 

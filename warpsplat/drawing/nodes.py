@@ -19,7 +19,7 @@ from warpsplat.drawing.cells import Cells, cells_around, joined
 from warpsplat.drawing.merge import handles_through
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

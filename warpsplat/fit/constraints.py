@@ -14,7 +14,7 @@ from warpsplat.kernels.constants import NONE
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import ranges
 
 Ints = npt.NDArray[np.int32]

@@ -378,9 +378,9 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
     if settings.size or settings.page or settings.units:
-        from warpsplat.svg.page import check_placing  # brings what writes files
+        from warpsplat.svg.page import sheet_for  # brings what writes files
 
-        check_placing(settings.size, settings.page, settings.units)
+        sheet_for(settings.size, settings.page, settings.units, 1, 1)
     return settings
 
 

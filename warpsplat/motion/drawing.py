@@ -12,9 +12,10 @@ import numpy as np
 
 from warpsplat.motion.films import Frame, frame_count, frame_size, rasterised, size_of, zoom_of
 from warpsplat.portable.linear import product
+from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import number
 from warpsplat.svg.paths import cubics
-from warpsplat.svg.write import MARK, NAMESPACE
+from warpsplat.svg.write import MARK
 
 SPACE = f"{{{NAMESPACE}}}"
 LINK = "http://www.w3.org/1999/xlink"

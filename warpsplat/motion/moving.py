@@ -16,7 +16,8 @@ from warpsplat.motion.follow import track_shapes
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Basis, FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.svg.data import even_cubic_data, even_spline_data
+from warpsplat.svg.commands import Pair, minus
+from warpsplat.svg.data import integers, relative_smooth, spline_joints
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.write import OPACITY_DECIMALS, PAINTED, STROKE_ATTRIBUTES
 
@@ -292,5 +293,13 @@ def _path_data(points: FloatArray, form: PathForm) -> str:
     """Return path data whose commands depend only on the number of points."""
     spline = form.basis == Basis.SPLINE
     grid = [(x, y) for x, y in np.round(points / 2 if spline else points).astype(np.int64).tolist()]
-    text = (even_spline_data if spline else even_cubic_data)(grid, bool(form.closed))
+    closed = bool(form.closed)
+    text = relative_smooth(*spline_joints(grid, closed)) if spline else _relative_cubics(grid, closed)
     return f"{text}z" if form.closed and form.kind == Kind.STROKE else text
+
+
+def _relative_cubics(grid: list[Pair], closed: bool) -> str:
+    """Return relative cubics; rings are not closed."""
+    chain = [*grid, grid[0]] if closed else grid
+    steps = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
+    return f"M{integers(grid[:1])}c{integers(steps)}"

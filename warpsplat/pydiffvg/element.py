@@ -19,12 +19,11 @@ from warpsplat.pydiffvg.optimizable import (
 )
 from warpsplat.pydiffvg.save_svg import path_data, rgb_text
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import DRAWN, Document, Element, name_of
 from warpsplat.svg.geometry import outline, parse_transform
 from warpsplat.svg.gradients import FlatColor, Gradient, parse_link, resolve_paint
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.paths import Subpath, cubics
-from warpsplat.svg.style import DRAWN
 from warpsplat.svg.values import SvgViewport, fraction, length
 
 Tensor = torch.Tensor

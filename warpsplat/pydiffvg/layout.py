@@ -312,7 +312,7 @@ def _scene(
     def traits(values: Iterable[int]) -> IntArray:
         return np.array([*values], np.int32)
 
-    return Scene.of(
+    return Scene(
         Canvas(*size, None),
         traits(row.kind for row in rows),
         starts_of(traits(map(sum, sizes))),

@@ -26,7 +26,7 @@ from warpsplat.native import machine_memory
 from warpsplat.rendering.memory import SHARE, in_words
 from warpsplat.scene import FloatArray, Kind
 from warpsplat.scene.geometry import enlarged
-from warpsplat.svg.strips import WHOLE_PIXELS
+from warpsplat.svg.viewer import WHOLE_PIXELS
 from warpsplat.svg.write import resized
 
 PROGRAM = 280 << 20

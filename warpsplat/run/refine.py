@@ -34,10 +34,8 @@ from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import KeptScene, load_kept
-from warpsplat.svg.strips import rows_of
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.read import KeptScene, load_kept
+from warpsplat.svg.viewer import on_white, render_svg, rows_of
 from warpsplat.svg.write import minified, shortened, write_svg
 
 if TYPE_CHECKING:
@@ -183,10 +181,7 @@ def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptSc
     target, settings = problem.target, problem.settings
     width, height = problem.size
     apart = settings.background != "none"
-    if keep:
-        base = load_kept(text, width, height, name, background_apart=apart)
-    else:
-        base = KeptScene(*load_scene(text, width, height, name, background_apart=apart), "")
+    base = load_kept(text, width, height, name, background_apart=apart, keep=keep)
     with naming(name):
         _check_read(text, base.scene, base.has_background)
     background, has_background = base.scene.canvas.background, base.has_background
@@ -207,7 +202,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
     Raises:
         ImageError: they differ.
     """
-    given = render_svg(text, width=scene.canvas.width, height=scene.canvas.height)
+    given = render_svg(text, size=(scene.canvas.width, scene.canvas.height))
     read = show(write_svg(scene, background=has_background), scene)
     if given.size != read.size:
         raise ImageError(f"renders as {given.width}x{given.height}, the image is {read.width}x{read.height}")

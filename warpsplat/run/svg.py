@@ -18,8 +18,7 @@ from warpsplat.metrics import Score, score_svg
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
-from warpsplat.svg.read import load_scene
-from warpsplat.svg.read_kept import load_kept
+from warpsplat.svg.read import load_kept
 from warpsplat.svg.write import minified
 
 SvgSource = str | os.PathLike[str] | bytes | Readable
@@ -41,12 +40,9 @@ def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
     name = svg_name_of(svg)
     text = text_of(svg, name)
     width, height = (max(1, math.floor(side + 0.5)) for side in size_of(text, name))
-    if keep:
-        kept = load_kept(text, width, height, name)
-        scene, has_background = kept.scene, kept.has_background
-    else:
-        scene, has_background = load_scene(text, width, height, name)
-    return scene if has_background else replace(scene, canvas=replace(scene.canvas, background=None))
+    read = load_kept(text, width, height, name, keep=keep)
+    scene = read.scene
+    return scene if read.has_background else replace(scene, canvas=replace(scene.canvas, background=None))
 
 
 def save_svg(

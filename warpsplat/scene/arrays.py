@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import (
-    ATTRIBUTES,
-    CHOICES,
-    NO_DASHES,
-    NO_PICTURE,
-    TRAITS,
-    Attribute,
-    Paint,
-    Unit,
-)
+from warpsplat.scene.attributes import ATTRIBUTES, CHOICES, NO_DASHES, NO_PICTURE, TRAITS, Paint, Unit
 from warpsplat.scene.scene import Scene
 
 Array = npt.NDArray[Any]
@@ -27,13 +18,8 @@ Array = npt.NDArray[Any]
 LAYOUT = ("kind", "basis", "first", "starts", "closed", "stop_first")
 """Arrays that give the rows of the others their meaning."""
 
-STARTS = ("first", "starts", "stop_first")
-"""Arrays that ascend from 0."""
-
 FARTHEST = 1e9
 """Largest coordinate or length [canvas units]."""
-
-MOST_LAYERS = 1_000_000
 
 
 def to_arrays(scene: Scene) -> dict[str, Array]:
@@ -52,8 +38,13 @@ def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
     values: dict[str, Any] = {name: typed(arrays, name, dtype) for name, dtype in whole.items()}
     if any(array.ndim != 1 for array in values.values()):
         raise ValueError("an array has more dimensions than one")
-    values |= {attribute.name: numbers(arrays, attribute) for attribute in ATTRIBUTES}
-    for name in STARTS:
+    for attribute in ATTRIBUTES:
+        found = values[attribute.name] = typed(arrays, attribute.name, np.float32)
+        if attribute.low[1] == attribute.high[1] == Unit.ONE:  # shapes read from a file may be opaque, or 0
+            between(attribute.name, found, min(attribute.low[0], 0.0), max(attribute.high[0], 1.0))
+        else:
+            between(attribute.name, found, 0.0 if attribute.name == "widths" else -FARTHEST, FARTHEST)
+    for name in ("first", "starts", "stop_first"):
         starts = values[name]
         if len(starts) < 2 or starts[0] != 0 or (np.diff(starts) < 0).any():
             raise ValueError(f"{name} does not ascend from 0")
@@ -63,9 +54,8 @@ def from_arrays(arrays: Mapping[str, Array], like: Scene) -> Scene:
         raise ValueError("stop_first is not that of the shapes")
     limits: dict[str, tuple[float, float]] = {
         **{choice.__name__.lower(): (min(choice), max(choice)) for choice in CHOICES},
-        "closed": (0, 1),
-        "twin": (0, 1),
-        "layer": (0, MOST_LAYERS),
+        **{"closed": (0, 1), "twin": (0, 1)},
+        "layer": (0, 1_000_000),
         "miter_limits": (0.0, math.inf),
         "dash": (NO_DASHES, len(like.dashes) - 1),
         "picture": (NO_PICTURE, len(like.pictures) - 1),
@@ -89,13 +79,3 @@ def between(name: str, values: Array, low: float, high: float) -> None:
     """Raise ``ValueError`` unless all ``values`` lie between two numbers."""
     if not ((values >= low) & (values <= high)).all():
         raise ValueError(f"{name} has numbers that are not from {low:g} to {high:g}")
-
-
-def numbers(arrays: Mapping[str, Array], attribute: Attribute) -> Array:
-    """Return the values of an attribute; raise ``ValueError`` for values that it cannot have."""
-    values = typed(arrays, attribute.name, np.float32)
-    if attribute.low[1] == attribute.high[1] == Unit.ONE:  # shapes read from a file may be opaque, or 0
-        between(attribute.name, values, min(attribute.low[0], 0.0), max(attribute.high[0], 1.0))
-    else:
-        between(attribute.name, values, 0.0 if attribute.name == "widths" else -FARTHEST, FARTHEST)
-    return values

@@ -78,6 +78,19 @@ class Spread(IntEnum):
     REPEAT = constants.REPEAT
 
 
+class Joint(IntEnum):
+    """Kind of a control point on a drawing's outline."""
+
+    FREE = 0
+    """A handle, or a point without conditions."""
+    CORNER = 1
+    """On the outline, which may turn there."""
+    SMOOTH = 2
+    """On the outline, which has no corner there: both handles lie on one line through it."""
+    LINE_HANDLE = 3
+    """At a third of a straight line."""
+
+
 CHOICES = (Kind, Basis, Rule, Cap, Join, Paint, Spread)
 """The types of traits; the fields of ``Scene`` have their names in lower case."""
 

@@ -16,15 +16,10 @@ PIECES = 8
 
 def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:
     """Return contours of equal length as cubics: (contour, point, 2) -> (contour, Bézier, 4, 2)."""
-    if basis == Basis.SPLINE:
-        return _elevated(points, closed)
-    count = points.shape[1]
-    starts = np.arange(0, count - (not closed), 3)
-    return points[:, (starts[:, None] + np.arange(4)[None, :]) % count]
-
-
-def _elevated(points: FloatArray, closed: bool) -> FloatArray:
-    """Return the quadratics of splines as cubics."""
+    if basis == Basis.CUBIC:
+        count = points.shape[1]
+        starts = np.arange(0, count - (not closed), 3)
+        return points[:, (starts[:, None] + np.arange(4)[None, :]) % count]
     if closed:
         before, middle, after = np.roll(points, 1, axis=1), points, np.roll(points, -1, axis=1)
     else:

@@ -69,25 +69,26 @@ class Scene:
 
     Below, "shape (shape, 3)" is an array with a row for each shape and three columns.
 
-    Contours and traits may be left out: then each shape has one contour, closed in fills and open in strokes.
+    Only ``canvas``, ``kind``, ``first`` and ``points`` must be given. By default, shapes are cubics of one
+    contour, closed in fills and open in strokes, traits have their defaults, and attributes are 0.
     """
 
     canvas: Canvas
     kind: IntArray
     """``Kind`` of each shape, shape (shape,)."""
-    basis: IntArray
-    """``Basis`` of each shape, shape (shape,)."""
     first: IntArray
     """First control point of each shape and, last, the number of points, shape (shape + 1,)."""
-    points: FloatArray
+    basis: IntArray = None  # type: ignore[assignment]  # __post_init__ fills in what is left out
+    """``Basis`` of each shape, shape (shape,)."""
+    points: FloatArray = None  # type: ignore[assignment]
     """Control points [canvas units], shape (point, 2)."""
-    colors: FloatArray
+    colors: FloatArray = None  # type: ignore[assignment]
     """sRGB in [0, 1], shape (shape, 3)."""
-    opacities: FloatArray
+    opacities: FloatArray = None  # type: ignore[assignment]
     """In [0, 1], shape (shape,)."""
-    widths: FloatArray
+    widths: FloatArray = None  # type: ignore[assignment]
     """Stroke widths [canvas units], shape (shape,); 0 for fills."""
-    starts: IntArray = None  # type: ignore[assignment]  # __post_init__ fills in what is left out
+    starts: IntArray = None  # type: ignore[assignment]
     """First control point of each contour and, last, the number of points, shape (contour + 1,)."""
     closed: IntArray = None  # type: ignore[assignment]
     """1 for closed contours, else 0, shape (contour,)."""
@@ -158,6 +159,7 @@ class Scene:
 
     def _fill_in(self) -> None:
         defaults: dict[str, Any] = {t.name: np.full(len(self), t.default, t.dtype) for t in TRAITS}
+        defaults["basis"] = np.full(len(self), Basis.CUBIC, np.int32)
         defaults["starts"] = self.first
         defaults["closed"] = (self.kind == Kind.FILL).astype(np.int32)
         defaults["stop_first"] = np.zeros(len(self) + 1, np.int32)
@@ -192,64 +194,29 @@ class Scene:
         return len(self.kind)
 
     @staticmethod
-    def of(
-        canvas: Canvas,
-        kind: IntArray,
-        first: IntArray,
-        basis: IntArray | None = None,
-        **attributes: Any,
-    ) -> Scene:
-        """Return shapes with these ``attributes``.
-
-        Args:
-            canvas: The canvas.
-            kind: Kind of each shape, shape (shape,).
-            first: As the field, shape (shape + 1,).
-            basis: Basis of each shape, shape (shape,); None: cubics.
-            attributes: Any of ``ATTRIBUTES``, by default 0, and ``points``; traits and contours.
-        """
-        rows: dict[str, Any] = {
-            a.name: np.zeros((len(kind), a.size) if a.size > 1 else len(kind), np.float32)
-            for a in ATTRIBUTES
-            if a.per == "shape"
-        }
-        if basis is None:
-            basis = np.full(len(kind), Basis.CUBIC, np.int32)
-        return Scene(canvas, kind, basis, first, **(rows | attributes))
-
-    @staticmethod
     def uniform(
         kind: Kind,
         canvas: Canvas,
         points: FloatArray,
         basis: Basis = Basis.CUBIC,
-        **attributes: FloatArray,
+        **attributes: Any,
     ) -> Scene:
-        """Return shapes of one kind and basis with equally many control points.
-
-        Args:
-            kind: Kind of all shapes.
-            canvas: The canvas.
-            points: Control points, shape (shape, point, 2).
-            basis: Basis of all shapes.
-            attributes: Others of ``ATTRIBUTES``, by default 0.
-        """
+        """Return shapes of one kind and basis with control points of shape (shape, point, 2)."""
         count, each = points.shape[:2]
-        return Scene.of(
+        return Scene(
             canvas,
             np.full(count, kind, np.int32),
             each * np.arange(count + 1, dtype=np.int32),
             np.full(count, basis, np.int32),
             points=np.ascontiguousarray(points, np.float32).reshape(-1, 2),
-            **{name: np.asarray(values, np.float32) for name, values in attributes.items()},
+            **{name: np.asarray(values, np.float32) for name, values in attributes.items()},  # type: ignore[arg-type]
         )
 
     def shape_of(self, attribute: Attribute) -> tuple[int, ...]:
         """Return the shape of an attribute's array."""
-        rows = {"point": len(self.points), "shape": len(self), "stop": int(self.stop_first[-1])}[
-            attribute.per
-        ]
-        return (rows, attribute.size) if attribute.size > 1 else (rows,)
+        rows = {"point": len(self.points), "shape": len(self), "stop": int(self.stop_first[-1])}
+        size = () if attribute.size == 1 else (attribute.size,)
+        return (rows[attribute.per], *size)
 
     def point_counts(self) -> IntArray:
         """Return the number of control points of each shape, shape (shape,)."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import hypot
@@ -17,6 +18,8 @@ from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.paths import Points, Subpath, cubics, line
 from warpsplat.svg.shapes import Shape
 from warpsplat.svg.values import SvgViewport, check_length
+
+Bools = npt.NDArray[np.bool_]
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
@@ -48,61 +51,38 @@ def clipped(shapes: list[Shape], corners: Points) -> list[Shape]:
     Raises:
         ImageError: A stroke reaches beyond it.
     """
-    ring = _oriented(corners)
-    if ring is None:
-        return []
     kept: list[Shape] = []
-    for shape, is_inside, is_outside in zip(shapes, *_places(shapes, ring), strict=True):
+    ring, inside, outside = _places(shapes, corners)
+    for shape, is_inside, is_outside in zip(shapes, inside, outside, strict=True):
         if is_inside:
-            kept.append(shape)
-        elif is_outside:
-            continue
-        elif shape.line is None:
+            is_twin = shape.is_twin and bool(kept) and kept[-1].subpaths is shape.subpaths
+            kept.append(replace(shape, is_twin=is_twin))
+        elif not is_outside:
+            if shape.line:
+                raise ImageError("a stroke that a viewport cuts off is not supported")
             if parts := [part for part in (cut_subpath(s, ring) for s in shape.subpaths) if part]:
-                kept.append(replace(shape, subpaths=parts, is_rect=False, known_box=[]))
-        else:
-            raise ImageError("a stroke that a viewport cuts off is not supported")
-    # A shape that was cut no longer shares its points.
-    return [
-        replace(shape, is_twin=False)
-        if shape.is_twin and (i == 0 or kept[i - 1].subpaths is not shape.subpaths)
-        else shape
-        for i, shape in enumerate(kept)
-    ]
+                kept.append(replace(shape, subpaths=parts, is_rect=False, is_twin=False, known_box=[]))
+    return kept
 
 
 def within(shapes: list[Shape], corners: Points) -> list[Shape]:
     """Return the shapes that lie wholly inside a convex polygon."""
-    ring = _oriented(corners)
-    if ring is None:
-        return []
-    return [shape for shape, is_inside in zip(shapes, _places(shapes, ring)[0], strict=True) if is_inside]
+    return [shape for shape, is_inside in zip(shapes, _places(shapes, corners)[1], strict=True) if is_inside]
 
 
-def _oriented(corners: Points) -> Points | None:
-    """Return the corners with the inside to the left of the sides; None if the area is 0."""
+def _places(shapes: list[Shape], corners: Points) -> tuple[Points, Bools, Bools]:
+    """Return a polygon with its inside to the left, and which shapes' boxes lie inside it, and outside."""
     following = np.roll(corners, -1, axis=0)
     doubled = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
-    if not abs(doubled) > TOLERANCE:
-        return None
-    return corners if doubled > 0 else corners[::-1]
-
-
-def _places(shapes: list[Shape], ring: Points) -> tuple[list[bool], list[bool]]:
-    """Return whether each shape's box lies inside a polygon, and whether it lies outside."""
-    if not shapes:
-        return [], []
+    ring = corners if doubled > 0 else corners[::-1]
+    if not shapes or not abs(doubled) > TOLERANCE:  # a polygon without area shows nothing
+        return ring, np.zeros(len(shapes), np.bool_), np.ones(len(shapes), np.bool_)
     boxes = np.stack([shape.box() for shape in shapes])
     around = boxes.reshape(-1, 4)[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 4, 2)
-    inward = [_heights(around, a, b) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
-    inside = np.all([(height >= -EDGE).all(axis=1) for height in inward], axis=0)
-    outside = np.any([(height <= EDGE).all(axis=1) for height in inward], axis=0)
-    return inside.tolist(), outside.tolist()
-
-
-def _heights(points: Points, a: Points, b: Points) -> Points:
-    """Return distances of points from the line from ``a`` to ``b``, positive to its left."""
-    return product(points - a, _normal(a, b))
+    sides = zip(ring, np.roll(ring, -1, axis=0), strict=True)
+    heights = np.stack([product(around - a, _normal(a, b)) for a, b in sides])
+    inside, outside = (heights >= -EDGE).all(axis=(0, 2)), (heights <= EDGE).all(axis=2).any(axis=0)
+    return ring, np.asarray(inside), np.asarray(outside)
 
 
 def _normal(a: Points, b: Points) -> Points:
@@ -115,13 +95,12 @@ def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
     """Return a closed subpath of a fill within a convex polygon; None if nothing is left.
 
     Cut by one side after another (Sutherland and Hodgman): what lies beyond a side becomes a straight line
-    along it, so that winding numbers inside stay.
-
-    Args:
-        subpath: What to cut; an open one is closed by a straight line.
-        corners: The polygon's corners, its inside to the left of its sides, shape (corner, 2).
+    along it, so that winding numbers inside stay. An open subpath is closed by a straight line. The polygon's
+    ``corners``, shape (corner, 2), have its inside to the left.
     """
-    chain = _cubics(subpath.points)
+    points = subpath.points
+    chain = [points[i : i + 4] for i in range(0, len(points) - 1, 3)]
+    chain += _joined(points[-1], points[0])
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         chain = _cut(chain, a, _normal(a, b))
         if not chain:
@@ -130,15 +109,11 @@ def cut_subpath(subpath: Subpath, corners: Points) -> Subpath | None:
     return Subpath(points, True, False)
 
 
-def _cubics(points: Points) -> list[Points]:
-    cubics = [points[i : i + 4] for i in range(0, len(points) - 1, 3)]
-    if not np.allclose(points[-1], points[0], rtol=0, atol=TOLERANCE):
-        cubics.append(_straight(points[-1], points[0]))
-    return cubics
-
-
-def _straight(start: Points, end: Points) -> Points:
-    return np.array([start, *((z.real, z.imag) for z in line(complex(*start), complex(*end)))])
+def _joined(start: Points, end: Points) -> list[Points]:
+    """Return a straight cubic between two points, or nothing where they coincide."""
+    if np.allclose(start, end, rtol=0, atol=TOLERANCE):
+        return []
+    return [np.array([start, *((z.real, z.imag) for z in line(complex(*start), complex(*end)))])]
 
 
 def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
@@ -148,12 +123,8 @@ def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
         for piece in _split(cubic, product(cubic - at, inward)):
             if product(product(piece - at, inward), [1, 3, 3, 1]) < -8 * TOLERANCE:
                 continue  # the middle lies outside
-            if kept and not np.allclose(kept[-1][-1], piece[0], rtol=0, atol=TOLERANCE):
-                kept.append(_straight(kept[-1][-1], piece[0]))
-            kept.append(piece)
-    if kept and not np.allclose(kept[-1][-1], kept[0][0], rtol=0, atol=TOLERANCE):
-        kept.append(_straight(kept[-1][-1], kept[0][0]))
-    return kept
+            kept += [*(_joined(kept[-1][-1], piece[0]) if kept else ()), piece]
+    return kept + _joined(kept[-1][-1], kept[0][0]) if kept else []
 
 
 def _split(cubic: Points, heights: Points) -> list[Points]:

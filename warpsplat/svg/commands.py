@@ -42,11 +42,11 @@ class _Written(NamedTuple):
     before: _Written | None
 
     def text(self) -> str:
-        parts, last = [], self
-        while last.before:
+        parts, last = [self.added], self.before
+        while last:
             parts.append(last.added)
             last = last.before
-        return "".join([last.added, *reversed(parts)])
+        return "".join(reversed(parts))
 
 
 def minus(a: Pair, b: Pair) -> Pair:
@@ -82,21 +82,14 @@ def choices(segment: Segment, mirrored: Pair) -> list[tuple[str, tuple[int, ...]
     return found
 
 
-class _Command(NamedTuple):
-    """A command that draws a segment, as text."""
-
-    letter: str
-    repeated: str
-    """Behind the same command: its numbers only."""
-    full: str
+_Command = tuple[str, str, str]
+"""A letter, the numbers as they follow the same letter, and both together."""
 
 
 def _commands(segment: Segment, mirrored: Pair) -> list[_Command]:
-    """Return ``choices`` as text."""
-    return [
-        _Command(letter, row(numbers, True), letter + row(numbers, False))
-        for letter, numbers in choices(segment, mirrored)
-    ]
+    """Return the commands that draw ``segment``; ``mirrored``: the first handle of a smooth cubic."""
+    found = choices(segment, mirrored)
+    return [(letter, row(numbers, True), letter + row(numbers, False)) for letter, numbers in found]
 
 
 def shortest(pen: Pair | None, segments: Sequence[Segment]) -> str:
@@ -134,14 +127,12 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
     A line that comes last need not be written.
     """
     behind = [segments[-1], *segments[:-1]]
-    commands = [
-        _commands(segment, before.mirrored()) for before, segment in zip(behind, segments, strict=True)
-    ]
+    commands = list(map(_commands, segments, (before.mirrored() for before in behind)))
     promise = []
     for i, (before, segment) in enumerate(zip(behind, segments, strict=True)):
         spared = 0
         if before.handles is None and len(segments) > 1:
-            spared = 1 + min(len(command.repeated) for command in commands[i - 1])
+            spared = 1 + min(len(repeated) for _, repeated, _ in commands[i - 1])
         promise.append((len(row(segment.start, False)) - spared, segment.start, i))
     found = []
     for _, start, i in sorted(promise)[:STARTS]:

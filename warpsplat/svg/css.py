@@ -7,10 +7,10 @@ that backtrack.
 
 from __future__ import annotations
 
+import functools
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -19,11 +19,10 @@ from warpsplat.svg.values import check_length
 
 Element = ElementTree.Element
 Parents = Mapping[Element, Element]
-Classes = Callable[[Element], frozenset[str]]
 
 
 class Declaration(NamedTuple):
-    """The value that a rule or a ``style`` attribute gives to a property."""
+    """A property's value in a rule or a ``style`` attribute."""
 
     name: str
     value: str
@@ -87,8 +86,14 @@ def ancestors(element: Element, parents: Parents) -> list[Element]:
     return found
 
 
-def _local_name(element: Element) -> str:
+def local_name(element: Element) -> str:
+    """Return an element's name without its namespace."""
     return str(element.tag).rpartition("}")[2]
+
+
+@functools.lru_cache(4096)
+def _classes(text: str) -> frozenset[str]:
+    return frozenset(text.split())
 
 
 OPERATORS: dict[str, Callable[[str, str], bool]] = {
@@ -103,11 +108,8 @@ OPERATORS: dict[str, Callable[[str, str], bool]] = {
 """Tests of an attribute's value."""
 
 SPECIFICITY = {
-    "id": (1, 0, 0),
-    "class": (0, 1, 0),
-    "attribute": (0, 1, 0),
-    "first": (0, 1, 0),
-    "tag": (0, 0, 1),
+    **{"id": (1, 0, 0), "tag": (0, 0, 1)},
+    **dict.fromkeys(("class", "attribute", "first"), (0, 1, 0)),
 }
 
 
@@ -119,17 +121,21 @@ class _Condition(NamedTuple):
     operator: str = ""
     value: str = ""
 
-    def holds(self, element: Element, parents: Parents, classes: Classes) -> bool:
+    def holds(self, element: Element, parents: Parents) -> bool:
         if self.kind == "tag":
-            return _local_name(element) == self.name
+            return local_name(element) == self.name
         if self.kind == "id":
             return element.get("id") == self.name
         if self.kind == "class":
-            return self.name in classes(element)
+            return self.name in _classes(element.get("class", ""))
         if self.kind == "first":
             return element not in parents or parents[element][0] is element
         value = element.get(self.name)
         return value is not None and OPERATORS[self.operator](value, self.value)
+
+
+KEYS = {"id": "#", "class": ".", "tag": ""}
+"""Marks before the names by which rules are found, the rarest first."""
 
 
 class _Compound(NamedTuple):
@@ -139,15 +145,13 @@ class _Compound(NamedTuple):
     is_child: bool
     """Whether the compound before is about the element's parent, rather than any ancestor."""
 
-    def matches(self, element: Element, parents: Parents, classes: Classes) -> bool:
-        return all(condition.holds(element, parents, classes) for condition in self.conditions)
+    def matches(self, element: Element, parents: Parents) -> bool:
+        return all(condition.holds(element, parents) for condition in self.conditions)
 
     def key(self) -> str:
         """Return an id, class or tag that the element must have; empty: none."""
         names = {condition.kind: condition.name for condition in reversed(self.conditions)}
-        if "id" in names:
-            return f"#{names['id']}"
-        return f".{names['class']}" if "class" in names else names.get("tag", "")
+        return next((mark + names[kind] for kind, mark in KEYS.items() if kind in names), "")
 
 
 STEP = re.compile(
@@ -181,23 +185,18 @@ def _parse_selector(selector: str) -> list[_Compound]:
     return compounds
 
 
-@dataclass(frozen=True)
-class _Rule:
+class _Rule(NamedTuple):
     compounds: list[_Compound]
     declarations: tuple[Declaration, ...]
     order: tuple[tuple[int, ...], int]
     """Specificity and place in the sheet."""
 
-    @property
-    def reads_attributes(self) -> bool:
-        return any(one.kind == "attribute" for compound in self.compounds for one in compound.conditions)
+    reads_attributes: bool
 
-    def matches(self, element: Element, parents: Parents, classes: Classes) -> bool:
+    def matches(self, element: Element, parents: Parents) -> bool:
         *outer, last = self.compounds
-        if not last.matches(element, parents, classes):
-            return False
-        if not outer:
-            return True
+        if not outer or not last.matches(element, parents):
+            return last.matches(element, parents)
         # From the root inwards: whether the first i compounds match, the last of them at the node above, or
         # at any node above.
         above = [True] + len(outer) * [False]
@@ -206,7 +205,7 @@ class _Rule:
             here = [False] * len(above)
             for i, compound in enumerate(outer):
                 before = above[i] if compound.is_child else inside[i]
-                here[i + 1] = before and compound.matches(node, parents, classes)
+                here[i + 1] = before and compound.matches(node, parents)
             inside = [a or b for a, b in zip(inside, here, strict=True)]
             above = here
         return above[-1] if last.is_child else inside[-1]
@@ -235,7 +234,6 @@ class StyleSheet:
         """
         self._rules: dict[str, list[_Rule]] = {}
         """By ``_Compound.key`` of the last compound."""
-        self._classes: dict[Element, frozenset[str]] = {}
         self._work = 0
         _, css = split_at_rules(css)
         if "@keyframes" in css:
@@ -248,9 +246,9 @@ class StyleSheet:
                 check_length(one.name, one.value)
             for selector in selectors.split(",") if own else ():
                 compounds = _parse_selector(selector.strip())
-                weights = [SPECIFICITY[one.kind] for compound in compounds for one in compound.conditions]
-                weight = tuple(map(sum, zip((0, 0, 0), *weights, strict=True)))
-                rule = _Rule(compounds, own, (weight, place))
+                kinds = [one.kind for compound in compounds for one in compound.conditions]
+                weight = tuple(map(sum, zip((0, 0, 0), *(SPECIFICITY[kind] for kind in kinds), strict=True)))
+                rule = _Rule(compounds, own, (weight, place), "attribute" in kinds)
                 self._rules.setdefault(compounds[-1].key(), []).append(rule)
 
     def of(self, element: Element, parents: Parents) -> Sequence[Declaration]:
@@ -261,8 +259,8 @@ class StyleSheet:
         """
         if not self._rules:
             return ()
-        keys = ["", _local_name(element), f"#{element.get('id', '')}"]
-        keys += [f".{name}" for name in self._classes_of(element)]
+        keys = ["", local_name(element), f"#{element.get('id', '')}"]
+        keys += [f".{name}" for name in _classes(element.get("class", ""))]
         asked = [rule for key in keys for rule in self._rules.get(key, ())]
         is_nested = any(len(rule.compounds) > 1 for rule in asked)
         depth = len(ancestors(element, parents)) if is_nested else 0
@@ -270,11 +268,6 @@ class StyleSheet:
         self._work += sum(1 + text * one.reads_attributes + depth * (len(one.compounds) - 1) for one in asked)
         if self._work > MAX_WORK:
             raise ImageError("has too many style rules for its number of elements")
-        matching = [rule for rule in asked if rule.matches(element, parents, self._classes_of)]
+        matching = [rule for rule in asked if rule.matches(element, parents)]
         self._work += DECLARATION_WORK * len(matching)
         return [d for rule in sorted(matching, key=lambda rule: rule.order) for d in rule.declarations]
-
-    def _classes_of(self, element: Element) -> frozenset[str]:
-        if element not in self._classes:
-            self._classes[element] = frozenset(element.get("class", "").split())
-        return self._classes[element]

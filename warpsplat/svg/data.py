@@ -6,7 +6,7 @@ Relative coordinates refer to the rounded position before, so that rounding erro
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -41,11 +41,8 @@ THIRD = 0.5 + 1e-9
 def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
     """Return which cubics a file shows as straight lines, by their first points, shape (point,).
 
-    Those are cubics with handles at the thirds, or with rounded handles on the line.
-
-    Args:
-        scene: The scene.
-        exact: Its points in units of the view box, shape (point, 2).
+    Those are cubics with handles at the thirds, or with rounded handles on the line. ``exact``: the points in
+    units of the view box, shape (point, 2).
     """
     found = np.zeros(len(exact), np.bool_)
     rows = cubic_rows(scene)
@@ -82,42 +79,42 @@ def cubic_rows(scene: Scene) -> IndexArray:
     return np.concatenate(rows).astype(np.intp) if rows else np.zeros((0, 4), np.intp)
 
 
-class PathData:
-    """The ``d`` attributes of a scene's shapes, with ``per_pixel`` units of the view box to a pixel."""
+def units(scene: Scene, per_pixel: float) -> Floats:
+    """Return the units of a file to a pixel for each point, shape (point, 1).
 
-    def __init__(self, scene: Scene, per_pixel: float) -> None:
-        spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
-        # Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
-        unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
-        exact = scene.points.astype(np.float64) * unit
-        self._straight: list[bool] = straight_cubics(scene, exact).tolist()
-        grid = np.round(exact).astype(np.int64).tolist()
-        self._grid: list[Pair] = [(x, y) for x, y in grid]
-        self._starts, self._closed = scene.starts.tolist(), scene.closed.tolist()
-        self._contours = np.searchsorted(scene.starts, scene.first).tolist()
-        self._strokes = (scene.kind == Kind.STROKE).tolist()
-        self._splines = (scene.basis == Basis.SPLINE).tolist()
-        self._has_twin = np.append(scene.twin[1:], 0).tolist()
+    Points of a spline lie on even numbers, so that its quadratics meet on whole ones.
+    """
+    spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
+    return np.where(spline, per_pixel / 2, per_pixel)[:, None]
 
-    def of(self, shape: int) -> str:
-        """Return the path data of one shape: its contours one after another."""
-        # A fill closes its contours, a stroke does not, and its dashes depend on the start.
-        is_stroked = bool(self._strokes[shape] or self._has_twin[shape])
+
+def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
+    """Yield the ``d`` attributes of a scene's shapes, with ``per_pixel`` units of the view box to a pixel."""
+    exact = scene.points.astype(np.float64) * units(scene, per_pixel)
+    straight = straight_cubics(scene, exact).tolist()
+    grid: list[Pair] = [(x, y) for x, y in np.round(exact).astype(np.int64).tolist()]
+    starts, closed = scene.starts.tolist(), scene.closed.astype(np.bool_).tolist()
+    contours = np.searchsorted(scene.starts, scene.first).tolist()
+    strokes = scene.kind == Kind.STROKE
+    # A fill closes its contours, a stroke does not, and its dashes depend on the start.
+    stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
+    for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):
         texts = []
         pen: Pair | None = None
-        for contour in range(*self._contours[shape : shape + 2]):
-            rows = slice(*self._starts[contour : contour + 2])
-            points, closed = self._grid[rows], bool(self._closed[contour])
-            if self._splines[shape]:
-                texts.append(spline_data(points, closed, may_rotate=not is_stroked))
-                texts.append("z" if closed and is_stroked else "")
+        for contour in range(*contours[shape : shape + 2]):
+            rows = slice(*starts[contour : contour + 2])
+            if is_spline:
+                texts.append(spline_data(grid[rows], closed[contour], may_rotate=not stroked[shape]))
+                texts.append("z" if closed[contour] and stroked[shape] else "")
                 continue
-            segments = segments_of(points, self._straight[rows][: len(points) - 2 : 3], closed)
-            if not self._strokes[shape]:  # only in a stroke does a dot show
+            segments = segments_of(
+                grid[rows], straight[rows][: rows.stop - rows.start - 2 : 3], closed[contour]
+            )
+            if not strokes[shape]:  # only in a stroke does a dot show
                 segments = [segment for segment in segments if segment.has_extent()]
-            text, pen = cubic_data(segments, points[0], closed, is_stroked, pen)
+            text, pen = cubic_data(segments, grid[rows.start], closed[contour], stroked[shape], pen)
             texts.append(text)
-        return "".join(texts)
+        yield "".join(texts)
 
 
 def cubic_data(
@@ -125,12 +122,7 @@ def cubic_data(
 ) -> tuple[str, Pair]:
     """Return the path data of a contour of lines and cubics, and where the pen is then.
 
-    Args:
-        segments: The contour's; a ring's last one is dropped if closing draws it.
-        start: Its first point.
-        closed: Whether it is a ring.
-        is_stroked: Whether a ring's joint is visible and its start may matter.
-        pen: Where the pen is before; None at the beginning.
+    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if any.
     """
     if not segments:
         return f"M{integers([start])}z", start
@@ -146,33 +138,19 @@ def cubic_data(
 def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool = True) -> str:
     """Return the path data of a spline: one quadratic, and smooth ones (SVG 1.1, 8.3.7).
 
-    Args:
-        half: Its points, in half of the numbers that are written.
-        closed: Whether they are a ring.
-        may_rotate: Whether a ring may start where that takes the fewest characters.
+    ``half``: its points, in half of the numbers that are written. ``may_rotate``: a ring may start where that
+    takes the fewest characters.
     """
     if closed and may_rotate:
         start = _cheapest_start(half)
         half = half[start:] + half[:start]
-    joints, control = _joints(half, closed)
+    joints, control = spline_joints(half, closed)
     if max(abs(value) for joint in joints for value in joint) <= SMALL:
         return shortest_smooth(joints, control)
-    return _relative(joints, control)
+    return relative_smooth(joints, control)
 
 
-def even_spline_data(half: list[Pair], closed: bool) -> str:
-    """Return data as ``spline_data``, with commands that depend on the number of points alone."""
-    return _relative(*_joints(half, closed))
-
-
-def even_cubic_data(grid: list[Pair], closed: bool) -> str:
-    """Return relative cubics: commands depend on the number of points alone, and rings are not closed."""
-    chain = [*grid, grid[0]] if closed else grid
-    steps = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
-    return f"M{integers(grid[:1])}c{integers(steps)}"
-
-
-def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
+def spline_joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
     """Return where the quadratics of a spline meet, and the first one's control point."""
     ring = [half[-1], *half, half[0]] if closed else half
     joints = [(a + c, b + d) for (a, b), (c, d) in itertools.pairwise(ring)]
@@ -181,7 +159,8 @@ def _joints(half: list[Pair], closed: bool) -> tuple[list[Pair], Pair]:
     return joints, (2 * ring[1][0], 2 * ring[1][1])
 
 
-def _relative(joints: list[Pair], control: Pair) -> str:
+def relative_smooth(joints: list[Pair], control: Pair) -> str:
+    """Return path data of smooth quadratics through ``joints`` in relative commands only."""
     steps = [minus(after, before) for before, after in itertools.pairwise(joints)]
     text = f"M{integers(joints[:1])}q{integers([minus(control, joints[0]), steps[0]])}"
     return f"{text}t{integers(steps[1:])}" if len(steps) > 1 else text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
@@ -60,7 +59,7 @@ class Excerpts:
         for element in [*sorted(elements, key=self._places.__getitem__), None]:
             path = [] if element is None else self._path(element)
             same = sum(1 for a, b in zip(around, path, strict=False) if a is b)
-            out += (self._tail(above) for above in reversed(around[same:]))
+            out += (self._slice(*self._spans[above][2:]) for above in reversed(around[same:]))
             out += (self._head(above, size) for above in path[same:])
             if element is not None:
                 out.append(self._whole(element))
@@ -115,17 +114,13 @@ class Excerpts:
         """Return an element without style sheets, which ``style`` returns."""
         start, _, _, end = self._spans[element]
         parts = []
-        first = bisect_left(self._sheets, (start, 0))
-        for sheet_start, sheet_end in itertools.islice(self._sheets, first, None):
-            if sheet_start >= end:
-                break
-            if start <= sheet_start and sheet_end <= end:
-                parts.append(self._slice(start, sheet_start))
-                start = sheet_end
+        for sheet in self._sheets[
+            bisect_left(self._sheets, (start, 0)) : bisect_left(self._sheets, (end, 0))
+        ]:
+            if start <= sheet[0] and sheet[1] <= end:
+                parts.append(self._slice(start, sheet[0]))
+                start = sheet[1]
         return "".join([*parts, self._slice(start, end)])
-
-    def _tail(self, element: Element) -> str:
-        return self._slice(*self._spans[element][2:])
 
     def _head(self, element: Element, size: tuple[float, float]) -> str:
         """Return a start tag, its ``id`` only the first time unless a style sheet asks for it."""
@@ -151,14 +146,14 @@ class Excerpts:
         return f"{tag[:-1].rstrip()}{own}>"
 
 
-Span = tuple[int, int, int, int]
+Span = list[int]
 """Where an element's start tag and its end tag, which may be empty, begin and end [bytes]."""
 
 
 def _spans(data: bytes) -> tuple[list[Span], dict[str, str]]:
     """Return the spans of all elements, in the order in which they begin, and the values of entities."""
-    spans: list[list[int]] = []
-    around: list[list[int]] = []
+    spans: list[Span] = []
+    around: list[Span] = []
     entities: dict[str, str] = {}
     parser = expat.ParserCreate("utf-8")
 
@@ -184,4 +179,4 @@ def _spans(data: bytes) -> tuple[list[Span], dict[str, str]]:
 
     parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = start, end, entity
     parser.Parse(data, True)
-    return [(a, b, c, d) for a, b, c, d in spans], entities
+    return spans, entities

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from warpsplat.errors import ImageError
 from warpsplat.portable import elementary
 from warpsplat.portable.linear import product
-from warpsplat.svg.inspect import NUMBER, view_box
+from warpsplat.svg.inspect import NUMBER, numbers, view_box
 from warpsplat.svg.paths import Points, Subpath
-from warpsplat.svg.values import SvgViewport, length, numbers
+from warpsplat.svg.values import SvgViewport, length
 
 Matrix = npt.NDArray[np.float64]
 
@@ -34,13 +34,12 @@ def attribute(attributes: Mapping[str, str], name: str, viewport: SvgViewport) -
 def outline(tag: str, attributes: Mapping[str, str], viewport: SvgViewport) -> str:
     """Return the path data of a shape element; empty: it draws nothing."""
 
-    def get(name: str) -> float:
-        return attribute(attributes, name, viewport) or 0.0
-
-    def radii() -> tuple[float, float]:
-        rx, ry = (attribute(attributes, name, viewport) for name in ("rx", "ry"))
-        rx, ry = (None if r is None or r < 0 else r for r in (rx, ry))
-        return (rx if rx is not None else ry) or 0.0, (ry if ry is not None else rx) or 0.0
+    def get(name: str, other: str = "") -> float:
+        """Return a length; if it is missing, or a negative radius, the ``other``, or 0."""
+        value = attribute(attributes, name, viewport)
+        if other and (value is None or value < 0):
+            value = max(get(other), 0.0)
+        return value or 0.0
 
     if tag == "path":
         return attributes.get("d", "")
@@ -50,9 +49,9 @@ def outline(tag: str, attributes: Mapping[str, str], viewport: SvgViewport) -> s
         return _poly(attributes.get("points", ""), closed=tag == "polygon")
     if tag == "rect":
         width, height = get("width"), get("height")
-        rx, ry = radii()
-        return _rect(get("x"), get("y"), width, height, min(rx, width / 2), min(ry, height / 2))
-    rx, ry = (get("r"), get("r")) if tag == "circle" else radii()
+        rx, ry = min(get("rx", "ry"), width / 2), min(get("ry", "rx"), height / 2)
+        return _rect(get("x"), get("y"), width, height, rx, ry)
+    rx, ry = (get("r"), get("r")) if tag == "circle" else (get("rx", "ry"), get("ry", "rx"))
     if not (rx > 0 and ry > 0):
         return ""
     x, y = get("cx"), get("cy")
@@ -148,12 +147,15 @@ def view_box_map(attributes: Mapping[str, str], width: float, height: float) -> 
     view = np.diag([*fit, 1.0])
     with np.errstate(all="ignore"):
         view[:2, 2] = shift - fit * (x, y)
-        if not np.isfinite(view).all():
-            raise ImageError("its viewBox is too far from the origin to be drawn")
+    if not np.isfinite(view).all():
+        raise ImageError("its viewBox is too far from the origin to be drawn")
     return view
 
 
-FUNCTION = re.compile(r"[\s,]*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
+COUNTS = {"matrix": {6}, "translate": {1, 2}, "scale": {1, 2}, "rotate": {1, 3}, "skewX": {1}, "skewY": {1}}
+"""Numbers of arguments of each transform function."""
+
+FUNCTION = re.compile(rf"[\s,]*({'|'.join(COUNTS)})\s*\(([^()]*)\)")
 
 
 def parse_transform(text: str) -> Matrix:
@@ -208,20 +210,20 @@ def _about(matrix: Matrix, x: float, y: float) -> Matrix:
 
 
 def _function(name: str, v: list[float]) -> Matrix | None:
-    count = len(v)
-    if name == "matrix" and count == 6:
-        return np.array([[v[0], v[2], v[4]], [v[1], v[3], v[5]], [0, 0, 1]])
-    if name == "translate" and count in {1, 2}:
-        return np.array([[1, 0, v[0]], [0, 1, v[1] if count == 2 else 0], [0, 0, 1]])
-    if name == "scale" and count in {1, 2}:
+    """Return the matrix of a transform function; None if it does not take so many arguments."""
+    if len(v) not in COUNTS[name]:
+        return None
+    if name == "matrix":
+        return np.array([v[::2], v[1::2], [0, 0, 1]])
+    if name == "translate":
+        return translation(v[0], v[1] if len(v) == 2 else 0)
+    if name == "scale":
         return np.diag([v[0], v[-1], 1])
-    if name == "rotate" and count in {1, 3}:
-        angle = np.deg2rad(v[0])
-        cosine, sine = float(elementary.cos(angle)), float(elementary.sin(angle))
-        rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        return _about(rotation, v[1], v[2]) if count == 3 else rotation
-    if name in {"skewX", "skewY"} and count == 1:
-        matrix = np.eye(3)
-        matrix[(0, 1) if name == "skewX" else (1, 0)] = elementary.tan(np.deg2rad(v[0]))
+    angle = np.deg2rad(v[0])
+    matrix = np.eye(3)
+    if name != "rotate":
+        matrix[(0, 1) if name == "skewX" else (1, 0)] = elementary.tan(angle)
         return matrix
-    return None
+    cosine, sine = float(elementary.cos(angle)), float(elementary.sin(angle))
+    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    return _about(matrix, v[1], v[2]) if len(v) == 3 else matrix

@@ -12,11 +12,10 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import determinant, product
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, about, attribute, parse_transform, tight_box, translation
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Subpath
-from warpsplat.svg.style import Style
 from warpsplat.svg.values import Color, SvgViewport, check_length, fraction, parse_color
 
 
@@ -49,7 +48,7 @@ class Gradient:
 Colouring = FlatColor | Gradient
 
 GRADIENTS = {"linearGradient", "radialGradient"}
-BLACK = FlatColor((0.0, 0.0, 0.0))
+BLACK = (0.0, 0.0, 0.0), 1.0
 """Paint for an invalid colour: the only fallback that viewers agree on."""
 
 LINK = re.compile(r"""url\(\s*(["']?)\s*#?""")
@@ -78,15 +77,9 @@ def resolve_paint(
     subpaths: list[Subpath],
     matrix: Matrix,
 ) -> Colouring | None:
-    """Return the paint of a shape; None: it has none.
+    """Return the paint of a shape whose ``fill`` or ``stroke`` is ``text``; None: it has none.
 
-    Args:
-        text: Value of ``fill`` or ``stroke``.
-        style: Style of the shape.
-        document: The document with the gradients.
-        viewport: The viewport that lengths refer to.
-        subpaths: The shape's subpaths [user units].
-        matrix: Map of user units to canvas units.
+    ``subpaths`` are in user units, which ``matrix`` maps to canvas units; lengths refer to ``viewport``.
 
     Raises:
         ImageError: A pattern, or a paint that only some viewers support.
@@ -94,14 +87,14 @@ def resolve_paint(
     link = parse_link(text.strip())
     if not link:
         return flat_paint(text, style)
-    name, rest = link
-    element = document.called(name)
-    fallback = flat_paint(rest, style) if rest else None
+    element = document.called(link[0])
+    fallback = flat_paint(link[1], style) if link[1] else None
     if element is None:
         return fallback
-    if name_of(element) in {"pattern", "mesh", "meshgradient", "hatch", "solidcolor"}:
-        raise ImageError(f"uses <{name_of(element)}>, not supported")
-    if name_of(element) not in GRADIENTS:
+    tag = name_of(element)
+    if tag in {"pattern", "mesh", "meshgradient", "hatch", "solidcolor"}:
+        raise ImageError(f"uses <{tag}>, not supported")
+    if tag not in GRADIENTS:
         return None
     return _gradient(element, document, viewport, subpaths, matrix, fallback)
 
@@ -112,7 +105,7 @@ def flat_paint(text: str, style: Style) -> FlatColor | None:
     if text == "none":
         return None
     color = parse_color(style["color"] if text == "currentcolor" else text)
-    return FlatColor(*color) if color else BLACK
+    return FlatColor(*(color or BLACK))
 
 
 def _gradient(
@@ -134,8 +127,7 @@ def _gradient(
     def given(name: str) -> str | None:
         """Return an attribute of the gradient or of those that it inherits from."""
         text = chain.attributes.get(("" if name in COMMON else name_of(element), name))
-        if text is not None:
-            check_length(name, text)
+        check_length(name, text or "")
         return text
 
     of_box = given("gradientUnits") != "userSpaceOnUse"
@@ -155,7 +147,7 @@ def _gradient(
     transform = about(document.style_of(element)["transform-origin"], viewport, transform)
     if of_box:
         transform = product(product(translation(*box[0]), np.diag([*extent, 1.0])), transform)
-    own, focus = _radial_frame(get) if is_radial else (_linear_frame(get), (0.0, 0.0, 0.0))
+    own, focus = (_radial_frame if is_radial else _linear_frame)(get)
     if own is None:
         return stops[-1]
     if not hypot(focus[0], focus[1]) + focus[2] < 1:
@@ -221,33 +213,30 @@ def _extended(element: Element, chain: _Chain) -> _Chain:
     return _Chain(element if has_stops else chain.stops, {**chain.attributes, **own})
 
 
-def _linear_frame(get: Callable[[str, str], float]) -> Matrix | None:
-    """Return the frame of the axis; None if it has no length."""
+CENTRE = (0.0, 0.0, 0.0)
+
+
+def _linear_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tuple[float, float, float]]:
+    """Return the frame of the axis, None if it has no length, and no focus."""
     start = x, y = get("x1", "0%"), get("y1", "0%")
     dx, dy = np.array([get("x2", "100%"), get("y2", "0%")]) - start
-    return np.array([[dx, -dy, x], [dy, dx, y], [0, 0, 1]]) if dx or dy else None
+    return np.array([[dx, -dy, x], [dy, dx, y], [0, 0, 1]]) if dx or dy else None, CENTRE
 
 
 def _radial_frame(get: Callable[[str, str], float]) -> tuple[Matrix | None, tuple[float, float, float]]:
     """Return the frame of the circle, None if it has no radius, and the focus in it."""
     radius, x, y = get("r", "50%"), get("cx", "50%"), get("cy", "50%")
     if not radius > 0:
-        return None, (0.0, 0.0, 0.0)
-    focus = (
-        (get("fx", repr(x)) - x) / radius,
-        (get("fy", repr(y)) - y) / radius,
-        max(get("fr", "0"), 0.0) / radius,
-    )
-    return product(translation(x, y), np.diag([radius, radius, 1.0])), focus
+        return None, CENTRE
+    fx, fy, fr = get("fx", repr(x)) - x, get("fy", repr(y)) - y, max(get("fr", "0"), 0.0)
+    return np.array([[radius, 0, x], [0, radius, y], [0, 0, 1]]), (fx / radius, fy / radius, fr / radius)
 
 
 def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tuple[FlatColor, ...]]:
     """Return the offsets, each at least the one before, and the colours of a gradient's stops."""
     offsets: list[float] = []
     stops: list[FlatColor] = []
-    for child in element:
-        if name_of(child) != "stop":
-            continue
+    for child in (child for child in element if name_of(child) == "stop"):
         style = document.style_of(child)
         text = child.get("offset", "").strip()
         before = offsets[-1] if offsets else 0.0

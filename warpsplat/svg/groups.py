@@ -73,10 +73,7 @@ class PathElement:
 def painted(paths: Sequence[PathElement], colors: Sequence[str], names: Names) -> list[str]:
     """Return the elements of ``paths``, neighbours of one paint in groups named after it.
 
-    Args:
-        paths: Paths in painter's order.
-        colors: Name of each path's paint.
-        names: Identifiers of groups so far.
+    ``colors``: the name of each path's paint. ``names``: identifiers of groups so far.
     """
     elements = []
     for paint, run in itertools.groupby(zip(paths, colors, strict=True), lambda one: one[0].shared[PAINT]):

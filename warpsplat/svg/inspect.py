@@ -122,9 +122,8 @@ def inspect_svg(text: str) -> SvgFacts:
         nonlocal depth, paths, nodes, hidden, behind
         if depth == 0:
             if tag != ROOT:
-                raise ImageError(
-                    f"not an SVG: its root is <{tag.rpartition(' ')[2][:40]}> of no or another kind"
-                )
+                name = tag.rpartition(" ")[2][:40]
+                raise ImageError(f"not an SVG: its root is <{name}> of no or another kind")
             root.update(attributes)
         depth += 1
         if depth > MAX_DEPTH:
@@ -134,21 +133,16 @@ def inspect_svg(text: str) -> SvgFacts:
             return
         if tag == RECT and not paths and not behind and _covers(attributes, root):
             behind = True
-        elif tag == PATH:
+        elif tag == PATH or tag in DRAWN:
             paths += 1
-            nodes += path_nodes(attributes.get("d", ""))
-        elif tag in DRAWN:
-            paths += 1
-            nodes += 1
+            nodes += path_nodes(attributes.get("d", "")) if tag == PATH else 1
 
     def end(tag: str) -> None:
         nonlocal depth, hidden
         depth -= 1
         hidden -= tag in HIDDEN
 
-    def entity(
-        name: str, parameter: int, value: str | None, base: str | None, system: str | None, *_: str | None
-    ) -> None:
+    def entity(name: str, parameter: int, value: str | None, *_: str | None) -> None:
         # The declaration comes before any use, so that nothing has been expanded yet.
         nonlocal longest
         longest = max(longest, len(value or ""))
@@ -168,31 +162,42 @@ def inspect_svg(text: str) -> SvgFacts:
     return SvgFacts(root, paths, nodes) if paths or not behind else SvgFacts(root, 1, 1)
 
 
-TOKEN = re.compile(r"([MLHVCSQTAZmlhvcsqtaz])|[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
+COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
 ARGUMENTS = {"m": 2, "l": 2, "t": 2, "h": 1, "v": 1, "s": 4, "q": 4, "c": 6, "a": 7, "z": 0}
 """Numbers that each path command takes for a node (SVG 1.1 section 8.3)."""
-COMPACT_FLAGS = re.compile(r"([\s,]*)([01])[\s,]*([01])")
+
+# With ``\d+\.?\d*`` there would be as many ways to match a long row of digits as it has digits.
+NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
+SPACES = re.compile(r"[\s,]*")
+NEXT_NUMBER = re.compile(rf"{SPACES.pattern}({NUMBER.pattern})")
+NEXT_FLAG = re.compile(rf"{SPACES.pattern}([01])")
+
+
+def numbers(text: str, *, of_arcs: bool = False) -> tuple[list[float], bool]:
+    """Return the numbers that a list begins with, and whether they are all of it.
+
+    A flag of an arc is one character, and need not be separated from the next number.
+    """
+    if not of_arcs and not NUMBER.sub(" ", text).strip(", \t\r\n\f"):
+        return [float(value) for value in NUMBER.findall(text)], True
+    values: list[float] = []
+    position = 0
+    while found := (NEXT_FLAG if of_arcs and len(values) % 7 in {3, 4} else NEXT_NUMBER).match(
+        text, position
+    ):
+        values.append(float(found[1]))
+        position = found.end()
+    return values, of_arcs and SPACES.fullmatch(text, position) is not None
 
 
 def path_nodes(data: str) -> int:
     """Return the number of points that a path passes through."""
-    nodes = count = position = 0
-    size = 0
-    arc = False
-    while found := TOKEN.search(data, position):
-        position = found.end()
-        if found[1]:
-            nodes += count // size if size else 0
-            count, size = 0, ARGUMENTS[found[1].lower()]
-            arc = found[1] in "aA"
-            continue
-        count += 1
-        if arc and count % 7 == 3:  # flags need not be separated from the next number
-            flags = COMPACT_FLAGS.match(data, position)
-            if flags:
-                position = flags.end()
-                count += 2
-    return nodes + (count // size if size else 0)
+    nodes = 0
+    for command, text in COMMAND.findall(data):
+        size = ARGUMENTS[command.lower()]
+        values = numbers(text, of_arcs=True)[0] if size == 7 else NUMBER.findall(text)
+        nodes += len(values) // size if size else 0
+    return nodes
 
 
 PIXELS_PER_UNIT = {
@@ -201,8 +206,6 @@ PIXELS_PER_UNIT = {
 }
 """CSS absolute lengths, and those relative to the default font size of 16 px, as in resvg."""
 
-# With ``\d+\.?\d*`` there would be as many ways to match a long row of digits as it has digits.
-NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 SEPARATOR = r"(?:\s*,\s*|\s+|(?=[-+]))"
 VIEW_BOX = re.compile(rf"\s*({NUMBER.pattern})" + 3 * rf"{SEPARATOR}({NUMBER.pattern})" + r"(?=[\s,]|$)")
 LENGTH = re.compile(rf"({NUMBER.pattern})(px|in|cm|mm|pt|pc|em|ex|%|)")
@@ -233,10 +236,9 @@ def view_box(root: Mapping[str, str]) -> tuple[float, float, float, float] | Non
     found = VIEW_BOX.match(root.get("viewBox", ""))
     if not found:
         return None
-    x, y, width, height = (float(part) for part in found.groups())
-    if not (width > 0 and height > 0 and all(map(math.isfinite, (x, y, width, height)))):
-        return None
-    return x, y, width, height
+    x, y, width, height = map(float, found.groups())
+    is_valid = width > 0 and height > 0 and all(map(math.isfinite, (x, y, width, height)))
+    return (x, y, width, height) if is_valid else None
 
 
 def svg_size(root: Mapping[str, str]) -> tuple[float, float] | None:
@@ -264,9 +266,8 @@ def svg_size(root: Mapping[str, str]) -> tuple[float, float] | None:
             width = box[2] if height is None else height * box[2] / box[3]
         if height is None:
             height = width * box[3] / box[2]
-    for side in (width, height):
-        if side is not None and not side > 0:
-            raise ImageError("its width or height is not positive")
+    if any(side is not None and not side > 0 for side in (width, height)):
+        raise ImageError("its width or height is not positive")
     if width is None or height is None:
         return None
     if not width * height <= MAX_PIXELS:

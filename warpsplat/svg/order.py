@@ -54,39 +54,31 @@ def _arrange(boxes: FloatArray, keys: Sequence[tuple[int, float]]) -> list[int]:
     """Return the order of shapes with these boxes and keys."""
     low, high = boxes[:, :2] - MARGIN / 2, boxes[:, 2:] + MARGIN / 2
     overlap: npt.NDArray[np.bool_] = np.all((low[:, None] < high[None]) & (low[None] < high[:, None]), axis=2)
-    above = [np.flatnonzero(overlap[i, i + 1 :]) + i + 1 for i in range(len(keys))]
-    below = np.triu(overlap, 1).sum(axis=0)
+    above = [(np.flatnonzero(overlap[i, i + 1 :]) + i + 1).tolist() for i in range(len(keys))]
+    below = np.triu(overlap, 1).sum(axis=0).tolist()
     """Number of unpainted shapes under each."""
+
+    def run_of(key: tuple[int, float]) -> list[int]:
+        """Return the shapes with ``key`` that can be painted one after another."""
+        run: list[int] = []
+        todo = [i for i in reversed(ready) if keys[i] == key]
+        left: dict[int, int] = {}
+        while todo:
+            i = todo.pop()
+            run.append(i)
+            for j in above[i]:
+                left[j] = left.get(j, below[j]) - 1
+                if left[j] == 0 and keys[j] == key:
+                    todo.append(j)
+        return run
+
     ready = [i for i in range(len(keys)) if below[i] == 0]
     order: list[int] = []
     while ready:
-        runs = [_run(key, ready, keys, above, below) for key in sorted({keys[i] for i in ready})]
-        run = max(runs, key=len)
+        run = max(map(run_of, sorted({keys[i] for i in ready})), key=len)
         order += run
-        for i in run:
-            below[above[i]] -= 1
-        painted = set(run)
-        freed = {j for i in run for j in above[i].tolist() if below[j] == 0}
-        ready = sorted((set(ready) | freed) - painted)
+        for j in itertools.chain.from_iterable(above[i] for i in run):
+            below[j] -= 1
+        freed = {j for i in run for j in above[i] if below[j] == 0}
+        ready = sorted((set(ready) | freed) - set(run))
     return order
-
-
-def _run(
-    key: tuple[int, float],
-    ready: Sequence[int],
-    keys: Sequence[tuple[int, float]],
-    above: Sequence[npt.NDArray[np.intp]],
-    below: npt.NDArray[np.int_],
-) -> list[int]:
-    """Return the shapes with ``key`` that can be painted one after another."""
-    run: list[int] = []
-    todo = [i for i in reversed(ready) if keys[i] == key]
-    left: dict[int, int] = {}
-    while todo:
-        i = todo.pop()
-        run.append(i)
-        for j in above[i].tolist():
-            left[j] = left.get(j, int(below[j])) - 1
-            if left[j] == 0 and keys[j] == key:
-                todo.append(j)
-    return run

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from warpsplat.errors import UsageError, cut, shown
+from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import number
-from warpsplat.svg.write import GRIDS, MARK, NAMESPACE, own_head
+from warpsplat.svg.write import GRIDS, MARK, head_of, own_head
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
 """Length of a CSS unit [mm]."""
@@ -17,7 +19,7 @@ PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "lett
 """Width and height of sheets upright [mm]."""
 
 MARGIN = 10.0
-"""Default margin of a page on each side [mm]."""
+"""Margin of a page on each side [mm]."""
 
 LARGEST = 10_000.0
 """Longest side of a sheet [mm]."""
@@ -31,8 +33,7 @@ VIEW = re.compile(
 OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
 """The same, surely written here: margins of other files may belong to the picture."""
 
-NUMBER = r"(\d+(?:\.\d+)?)"
-SIZE = re.compile(rf"{NUMBER}\s*[x×]\s*{NUMBER}\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
+SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
 
 DECIMALS = 3
 """Decimals of sizes and boxes."""
@@ -52,91 +53,48 @@ class Sheet:
     """Unit of the size in the file."""
 
 
-def parse_size(text: str, unit: str = "mm") -> Sheet:
-    """Return the sheet of a size such as ``200x150mm`` or ``8x6in``.
+def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet:
+    """Return the sheet that options ask for.
 
     Args:
-        text: Width and height; without a unit, in ``unit``.
-        unit: Unit of the size in the file.
+        size: A size such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Empty: none.
+        page: A standard format, with margins, in landscape for a picture wider than high. Empty: none.
+        unit: Unit of the size in the file; empty: millimetres.
+        width: Width of the picture [px], its own size if there is neither a size nor a page.
+        height: Height of the picture [px].
 
     Raises:
-        UsageError: The text is not a size.
+        UsageError: An option is invalid.
     """
-    check_unit(unit)
-    found = SIZE.fullmatch(text.strip())
-    if not found:
-        raise UsageError(f"not a size: {shown(text)}; write 200x150mm")
-    factor = MILLIMETRES[(found[3] or unit).lower()]
-    return _checked(Sheet(float(found[1]) * factor, float(found[2]) * factor, unit=unit), text)
-
-
-def parse_page(name: str, width: int, height: int, margin: float = MARGIN, unit: str = "mm") -> Sheet:
-    """Return a sheet of a standard format, in landscape for a picture that is wider than high.
-
-    Args:
-        name: The format.
-        width: Width of the picture.
-        height: Height of the picture.
-        margin: Kept free on each side [mm].
-        unit: Unit of the size in the file.
-
-    Raises:
-        UsageError: There is no such format, or no space between the margins.
-    """
-    check_unit(unit)
-    if name.lower() not in PAGES:
-        raise UsageError(f"page must be one of {', '.join(PAGES)}, not {shown(name)}")
-    short, long = PAGES[name.lower()]
-    sides = (long, short) if width > height else (short, long)
-    return _checked(Sheet(*sides, margin, unit), f"{name} with margins of {margin:g} mm")
-
-
-def check_unit(unit: str) -> None:
-    """Raise ``UsageError`` for a unit that files cannot have."""
-    if unit not in MILLIMETRES:
+    if unit and unit not in MILLIMETRES:
         raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {shown(unit)}")
-
-
-def _checked(sheet: Sheet, name: str) -> Sheet:
-    for side in (sheet.width, sheet.height):
-        if not 0 < side <= LARGEST or sheet.margin < 0 or side <= 2 * sheet.margin:
-            raise UsageError(f"size {cut(name)} leaves no room, or has a side beyond {LARGEST:g} mm")
-    return sheet
-
-
-def check_placing(size: str, page: str, unit: str) -> None:
-    """Raise ``UsageError`` for options that ``placed`` does not understand."""
-    if size:
-        parse_size(size, unit or "mm")
-    elif page:
-        parse_page(page, 1, 1, unit=unit or "mm")
-    elif unit:
-        check_unit(unit)
+    unit = unit or "mm"
+    if not size and not page:
+        return Sheet(width * MILLIMETRES["px"], height * MILLIMETRES["px"], unit=unit)
+    if not size:
+        if page.lower() not in PAGES:
+            raise UsageError(f"page must be one of {', '.join(PAGES)}, not {shown(page)}")
+        short, long = PAGES[page.lower()]
+        return Sheet(*((long, short) if width > height else (short, long)), MARGIN, unit)
+    found = SIZE.fullmatch(size.strip())
+    if not found:
+        raise UsageError(f"not a size: {shown(size)}; write 200x150mm")
+    factor = MILLIMETRES[(found[3] or unit).lower()]
+    sides = [float(found[i]) * factor for i in (1, 2)]
+    if not all(0 < side <= LARGEST for side in sides):
+        raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
+    return Sheet(sides[0], sides[1], unit=unit)
 
 
 def placed(text: str, size: str, page: str, unit: str) -> str:
-    """Return a file written here, as large as options ask for.
-
-    Args:
-        text: The file.
-        size: A size as for ``parse_size``; empty: none.
-        page: A page as for ``parse_page``; empty: none.
-        unit: Unit of the file's size; empty: pixels, or millimetres of a size or page.
-
-    Raises:
-        UsageError: An option is invalid, or both a size and a page are given.
-    """
-    check_placing(size, page, unit)
+    """Return a file written here, as large as options ask for; arguments and errors as ``sheet_for``."""
     if not (size or page or unit):
         return text
-    if size:
-        return on_sheet(text, parse_size(size, unit or "mm"))
     head = own_head(text)
-    width, height = int(head[1]), int(head[2])
-    if page:
-        return on_sheet(text, parse_page(page, width, height, unit=unit or "mm"))
-    sheet = Sheet(width * 25.4 / 96, height * 25.4 / 96, unit=unit)
-    return _with_size(text, sheet, (0, 0, float(head[3]), float(head[4])))
+    sheet = sheet_for(size, page, unit, int(head[1]), int(head[2]))
+    if size or page:
+        return on_sheet(text, sheet)
+    return _with_head(text, _attributes(sheet), (0, 0, float(head[3]), float(head[4])))
 
 
 def on_sheet(text: str, sheet: Sheet) -> str:
@@ -149,19 +107,20 @@ def on_sheet(text: str, sheet: Sheet) -> str:
     units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
     across, down = math.ceil(sheet.width * units), math.ceil(sheet.height * units)
     left, top = round((width - across) / 2), round((height - down) / 2)
-    return _with_size(text, sheet, (left, top, across, down))
+    return _with_head(text, _attributes(sheet), (left, top, across, down))
 
 
-def _with_size(text: str, sheet: Sheet, view: tuple[float, float, float, float]) -> str:
-    """Return the file with another size and view box."""
+def _attributes(sheet: Sheet) -> str:
+    """Return the size of a sheet as attributes."""
     width, height = (
         number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
     )
+    return f'width="{width}" height="{height}"'
+
+
+def _with_head(text: str, size: str, view: Iterable[float]) -> str:
+    """Return the file with other attributes for its size and another view box."""
     box = " ".join(number(value, DECIMALS) for value in view)
-    return _with_head(text, f'width="{width}" height="{height}"', box)
-
-
-def _with_head(text: str, size: str, box: str) -> str:
     return f'<svg xmlns="{NAMESPACE}" {size} viewBox="{box}">{text[own_head(text).end() :]}'
 
 
@@ -193,18 +152,15 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
 
 def with_view(svg: str, view: str, width: int, height: int) -> str:
     """Return a file on a sheet with the view box ``view`` and the image's size [px]."""
-    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}"'
-    return VIEW.sub(head, svg, count=1)
+    return VIEW.sub(head_of(width, height, view).removesuffix(">"), svg, count=1)
 
 
 def on_sheet_of(svg: str, view: str, text: str) -> str:
-    """Return ``text``, a file written here, on the sheet of ``svg``, in the place and size of the picture
-    there.
+    """Return ``text``, a file written here, on the sheet of ``svg``, in place of the picture there.
 
     ``view``: that picture's view box.
     """
     sheet = VIEW.match(svg)
     assert sheet
     scale = float(own_head(text)[3]) / float(view.split()[2])
-    box = " ".join(number(scale * float(sheet[i]), DECIMALS) for i in range(2, 6))
-    return _with_head(text, sheet[1], box)
+    return _with_head(text, sheet[1], (scale * float(sheet[i]) for i in range(2, 6)))

@@ -79,21 +79,18 @@ def _circle(origin: Floats, axes: Floats, focus: Floats, decimals: int) -> str:
     along, across = axes
     length = math.sqrt(float((along * along).sum()))
     upright = np.array([-along[1], along[0]])
+    is_circle = min(np.abs(across - upright).max(), np.abs(across + upright).max()) <= ROUND * length
     fx, fy, fr = focus.tolist()
-    if min(np.abs(across - upright).max(), np.abs(across + upright).max()) <= ROUND * length:
-        place = {"cx": origin[0], "cy": origin[1], "r": length}
-        if fx or fy:
-            place["fx"], place["fy"] = origin + fx * along + fy * across
-        if fr:
-            place["fr"] = fr * length
+    place = {"cx": 0.0, "cy": 0.0, "r": 1.0, "fx": fx, "fy": fy, "fr": fr}
+    if is_circle:
+        fx_on, fy_on = origin + fx * along + fy * across
+        place = {"cx": origin[0], "cy": origin[1], "r": length, "fx": fx_on, "fy": fy_on, "fr": fr * length}
+    left_out = (() if fx or fy else ("fx", "fy")) + (() if fr else ("fr",))
+    place = {name: value for name, value in place.items() if name not in left_out}
+    if is_circle:
         return _attributes(place, decimals)
-    unit = {"cx": 0.0, "cy": 0.0, "r": 1.0}
-    if fx or fy:
-        unit |= {"fx": fx, "fy": fy}
-    if fr:
-        unit["fr"] = fr
     matrix = " ".join(number(float(value), SHARE_DECIMALS) for value in (*along, *across, *origin))
-    return f'{_attributes(unit, SHARE_DECIMALS)} gradientTransform="matrix({matrix})"'
+    return f'{_attributes(place, SHARE_DECIMALS)} gradientTransform="matrix({matrix})"'
 
 
 def _stops(scene: Scene, shape: int) -> str:

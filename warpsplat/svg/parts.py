@@ -24,33 +24,22 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
     Shapes that are filled and stroked stay whole.
     """
     contours = np.searchsorted(scene.starts, scene.first).astype(np.intp)
-    nodes = _nodes(scene)
+    points = np.diff(scene.starts)
+    cubic = scene.basis[scene.contour_shapes()] == Basis.CUBIC
+    nodes: IndexArray = np.where(cubic, -(-points // 3), points).astype(np.intp)
     total = np.add.reduceat(np.append(nodes, 0), contours[:-1]) if len(scene) else nodes
     has_twin = np.append(scene.twin[1:], 0).astype(np.bool_) | scene.twin.astype(np.bool_)
     large = (total > most) & (np.diff(contours) > 1) & ~has_twin
     if not large.any():
         return scene
     parts: list[list[IndexArray]] = [[np.arange(low, high)] for low, high in itertools.pairwise(contours)]
-    boxes = _boxes(scene)
+    ends = [extreme.reduceat(scene.points, scene.starts[:-1], axis=0) for extreme in (np.minimum, np.maximum)]
+    boxes = np.concatenate(ends, axis=1)
     for shape in np.flatnonzero(large).tolist():
         own = parts[shape][0]
         pad = 0.5 * (MARGIN + float(scene.widths[shape]))
         parts[shape] = [own[part] for part in _packed(_clusters(boxes[own], pad), nodes[own], most)]
     return _with_parts(scene, parts)
-
-
-def _nodes(scene: Scene) -> IndexArray:
-    """Return the number of nodes of each contour: where its segments begin and end."""
-    points = np.diff(scene.starts)
-    shape = np.searchsorted(scene.first, scene.starts[:-1], "right") - 1
-    return np.where(scene.basis[shape] == Basis.CUBIC, -(-points // 3), points).astype(np.intp)
-
-
-def _boxes(scene: Scene) -> FloatArray:
-    """Return the box of each contour's control points, shape (contour, 4)."""
-    low = np.minimum.reduceat(scene.points, scene.starts[:-1], axis=0)
-    high = np.maximum.reduceat(scene.points, scene.starts[:-1], axis=0)
-    return np.concatenate([low, high], axis=1)
 
 
 def _clusters(boxes: FloatArray, pad: float) -> list[list[int]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -11,14 +10,9 @@ import numpy.typing as npt
 
 from warpsplat.portable.elementary import arctan2, cos, sin, tan
 from warpsplat.portable.linear import product
-from warpsplat.svg.inspect import ARGUMENTS, NUMBER
-from warpsplat.svg.values import after_space, numbers
+from warpsplat.svg.inspect import ARGUMENTS, COMMAND, numbers
 
 Points = npt.NDArray[np.float64]
-
-COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-FLAG = re.compile(r"[01]")
-
 
 CLOSES = 1e-3
 """Largest distance [px] of a closed spline's start from the middle of its control points."""
@@ -68,7 +62,7 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
     pen = _Pen()
     for command, text in COMMAND.findall(data):
         size = ARGUMENTS[command.lower()]
-        values, is_whole = _arc_arguments(text) if command in "Aa" else numbers(text)
+        values, is_whole = numbers(text, of_arcs=size == 7)
         for i in range(0, max(len(values) - size + 1, 1 - size), max(size, 1)):
             # Further pairs after a move are lines.
             move_on = i and command in "Mm"
@@ -80,22 +74,6 @@ def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:
         for points, is_closed, is_spline in pen.finish(keep_dots)
         if len(points) > 1
     ]
-
-
-def _arc_arguments(text: str) -> tuple[list[float], bool]:
-    """Return the numbers of arcs, and whether they are all of the text.
-
-    A flag is one character, and need not be separated from the next number.
-    """
-    values: list[float] = []
-    position = after_space(text, 0)
-    while position < len(text):
-        found = (FLAG if len(values) % 7 in {3, 4} else NUMBER).match(text, position)
-        if not found:
-            return values, False
-        values.append(float(found[0]))
-        position = after_space(text, found.end())
-    return values, True
 
 
 class _Pen:
@@ -114,27 +92,22 @@ class _Pen:
         """Draw one command with the arguments of one node."""
         kind = command.lower()
         origin = self.at if command == kind else 0j
+        before, self.control = self.control, ("", 0j)
         if kind == "m":
             self._lift(False)
             self.at = self.start = origin + complex(v[0], v[1])
             self.points = [self.at]
-        elif kind == "z":
+            return
+        if kind == "z":
             # Relative coordinates return to the start up to rounding, which needs no further cubic.
             if not (_is_near(self.at.real, self.start.real) and _is_near(self.at.imag, self.start.imag)):
                 self._line(self.start)
                 self.is_spline = False
             self._lift(True)
-        else:
-            if not self.points:  # a subpath was closed before
-                self.points = [self.at]
-            # In a spline only the first command has a control point.
-            self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
-            self._segment(kind, v, origin)
             return
-        self.control = ("", 0j)
-
-    def _segment(self, kind: str, v: list[float], origin: complex) -> None:
-        control = ("", 0j)
+        self.points = self.points or [self.at]  # empty: a subpath was closed before
+        # In a spline only the first command has a control point.
+        self.is_spline &= kind == ("t" if len(self.points) > 1 else "q")
         if kind == "h":
             self._line(complex(origin.real + v[0], self.at.imag))
         elif kind == "v":
@@ -145,16 +118,15 @@ class _Pen:
             points = [origin + complex(x, y) for x, y in zip(v[::2], v[1::2], strict=True)]
             family = {"s": "c", "t": "q"}.get(kind, kind)
             if family != kind:  # smooth: the control point before, mirrored
-                points.insert(0, 2 * self.at - self.control[1] if self.control[0] == family else self.at)
+                points.insert(0, 2 * self.at - before[1] if before[0] == family else self.at)
             if family == "l":
                 self._line(points[0])
-            else:
-                control = (family, points[-2])
-                if family == "q":
-                    points = [(self.at + 2 * points[0]) / 3, (points[1] + 2 * points[0]) / 3, points[1]]
-                self.points += points
-                self.at = points[-1]
-        self.control = control
+                return
+            self.control = (family, points[-2])
+            if family == "q":
+                points = [(self.at + 2 * points[0]) / 3, (points[1] + 2 * points[0]) / 3, points[1]]
+            self.points += points
+            self.at = points[-1]
 
     def _lift(self, is_closed: bool) -> None:
         if self.points:

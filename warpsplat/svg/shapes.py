@@ -15,12 +15,11 @@ import numpy as np
 from warpsplat.errors import ImageError
 from warpsplat.scene import Cap, Join, Picture, Rule
 from warpsplat.svg.css import ANIMATED
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
 from warpsplat.svg.gradients import Colouring, FlatColor, resolve_paint
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Points, Subpath, cubics
-from warpsplat.svg.style import Style
 from warpsplat.svg.values import SvgViewport, fraction, length, lengths, parse_color
 
 MAX_EXTENT = 1e5
@@ -84,10 +83,10 @@ class Placement:
     matrix: Matrix
     """Map of its units to canvas units."""
     viewport: SvgViewport
-    context: tuple[str, str]
+    paints: tuple[str, str]
     """The values of ``context-fill`` and ``context-stroke``."""
-    is_linked: bool = False
-    """Whether a link shows it; others may show it as well."""
+    path: tuple[Element, ...]
+    """The links that show it."""
 
 
 def element_shapes(element: Element, document: Document, place: Placement) -> list[Shape]:
@@ -103,18 +102,16 @@ def element_shapes(element: Element, document: Document, place: Placement) -> li
         return []
     if style["visibility"] != "visible":
         raise ImageError(f"visibility {style['visibility'][:40]!r} is not known")
-    line = _line(style, place) if style["stroke"] != "none" else None
+    line = _line(place) if style["stroke"] != "none" else None
     keeps_dots = line is not None and line.cap != Cap.BUTT
-    if tag == "path" and place.is_linked:
+    if tag == "path" and place.path:  # others may show it as well
         own = document.once(_cubics_with_dots if keeps_dots else _cubics, element)
     else:
         own = cubics(outline(tag, element.attrib, place.viewport), keep_dots=keeps_dots)
     if not own:
         return []
-    fill, stroke = (
-        _paint(name, style, document, place, own) if wanted else None
-        for name, wanted in (("fill", tag != "line"), ("stroke", line is not None))
-    )
+    fill = _paint("fill", document, place, own) if tag != "line" else None
+    stroke = _paint("stroke", document, place, own) if line else None
     subpaths = [subpath.moved(place.matrix[:2, :2], place.matrix[:2, 2]) for subpath in own]
     _check(style, subpaths, line if stroke else None)
     shapes = []
@@ -143,26 +140,24 @@ _cubics_with_dots = functools.partial(_cubics, keep_dots=True)
 ANIMATIONS = {"animate", "animateTransform", "animateMotion", "set"}
 
 
-def _paint(
-    name: str, style: Style, document: Document, place: Placement, own: list[Subpath]
-) -> Colouring | None:
+def _paint(name: str, document: Document, place: Placement, own: list[Subpath]) -> Colouring | None:
     """Return the paint of a fill or stroke; None: it has none."""
-    text = style[name].strip()
+    text = place.style[name].strip()
     if text in CONTEXTS:
-        text = place.context[CONTEXTS.index(text)]
+        text = place.paints[CONTEXTS.index(text)]
         if "url(" in text:
             raise ImageError("uses the gradient of a context, not supported")
     if name == "stroke" and "url(" not in text and text.lower() not in {"none", "currentcolor"}:
         text = text if parse_color(text) else "none"
-    return resolve_paint(text, style, document, place.viewport, own, place.matrix)
+    return resolve_paint(text, place.style, document, place.viewport, own, place.matrix)
 
 
 CONTEXTS = ("context-fill", "context-stroke")
 
 
-def _line(style: Style, place: Placement) -> LineStyle | None:
+def _line(place: Placement) -> LineStyle | None:
     """Return how a stroke is drawn; None: it is not."""
-    viewport, scale = place.viewport, similarity(place.matrix) or 1.0
+    style, viewport, scale = place.style, place.viewport, similarity(place.matrix) or 1.0
 
     def get(name: str, default: float) -> float:
         value = length(style[name], viewport.diagonal, name, viewport.font_size)
@@ -198,9 +193,8 @@ JOINS = {"round": Join.ROUND, "bevel": Join.BEVEL}
 def _strokes_first(order: str) -> bool:
     """Return whether the stroke lies below the fill."""
     words = order.split()
-    if len(set(words)) < len(words) or not set(words) <= {"fill", "stroke", "markers"}:
-        return False
-    return "stroke" in words and "fill" not in words[: words.index("stroke")]
+    is_valid = len(set(words)) == len(words) and {"stroke"} <= set(words) <= {"fill", "stroke", "markers"}
+    return is_valid and "fill" not in words[: words.index("stroke")]
 
 
 def _check(style: Style, subpaths: list[Subpath], line: LineStyle | None) -> None:
@@ -225,9 +219,9 @@ def _is_of_pixels(subpaths: list[Subpath]) -> bool:
     """Return whether all outlines run along pixel edges."""
     for subpath in subpaths:
         ends = subpath.points[::3]
-        ring = np.concatenate([subpath.points, subpath.points[:1]])
-        is_level = (np.abs(np.diff(ring, axis=0)) <= BETWEEN_PIXELS).any(axis=1)
-        if not is_level.all() or not (np.abs(ends - np.round(ends)) <= BETWEEN_PIXELS).all():
+        steps = np.diff(subpath.points, axis=0, append=subpath.points[:1])
+        gaps = [*np.abs(steps).min(axis=1), *np.abs(ends - np.round(ends)).ravel()]
+        if not np.max(gaps) <= BETWEEN_PIXELS:
             return False
     return True
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.portable.linear import determinant, product
-from warpsplat.scene import Rule
-from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon
+from warpsplat.svg.clip import clip_rectangle, clipped, overlap, polygon, within
 from warpsplat.svg.css import ancestors
-from warpsplat.svg.document import Document, Element, name_of
+from warpsplat.svg.document import DRAWN, ROOT, Document, Element, name_of
 from warpsplat.svg.geometry import (
     Matrix,
     about,
@@ -26,10 +26,8 @@ from warpsplat.svg.geometry import (
 from warpsplat.svg.gradients import FlatColor
 from warpsplat.svg.groups import LEVEL_ID
 from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
-from warpsplat.svg.kept import Keeping, Part, shapes_of
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Placement, Shape, element_shapes
-from warpsplat.svg.style import DRAWN, ROOT, Style
 from warpsplat.svg.values import SvgViewport, fraction, parse_color
 
 MAX_LINKED = 100_000
@@ -47,10 +45,8 @@ PAIRS = 30
 MAX_DEPTH = 1000
 """Deepest nesting, links included."""
 
-REFUSED = {
-    *("text", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe", "mesh", "hatch"),
-    "tref",
-}
+REFUSED = {"text", "tref", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe"}
+REFUSED |= {"mesh", "hatch"}
 """Elements that show something other than shapes. Unknown elements show nothing."""
 
 VISITED = {*DRAWN, "svg", "g", "a", "use"}
@@ -59,7 +55,29 @@ VISITED = {*DRAWN, "svg", "g", "a", "use"}
 LEVEL = re.compile(rf"{LEVEL_ID}\d{{1,9}}")
 """Names of the groups that are the levels of a layered file."""
 
+UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+"""Corners of a square of size 1."""
+
 CONDITIONS = ("systemLanguage", "requiredFeatures", "requiredExtensions")
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An element that no shape can hold and a file keeps whole."""
+
+    element: Element
+    cause: str
+    """Why no shape can hold it."""
+    blends: bool
+    """Whether its colours depend on what lies below."""
+
+
+Part = Shape | Kept
+
+
+def shapes_of(parts: Sequence[Part]) -> list[Shape]:
+    """Return the parts that are shapes."""
+    return [part for part in parts if isinstance(part, Shape)]
 
 
 @dataclass(frozen=True)
@@ -74,17 +92,9 @@ class _Unit:
 
 
 @dataclass(frozen=True)
-class _Context:
+class _Context(Placement):
     """Properties that an element inherits."""
 
-    style: Style
-    """Its parent's."""
-    matrix: Matrix
-    viewport: SvgViewport
-    paints: tuple[str, str]
-    """See ``Placement.context``."""
-    path: tuple[Element, ...]
-    """The links that led here."""
     depth: int
     use_size: tuple[float | None, float | None] = (None, None)
     """The size that a link gives a nested ``svg``."""
@@ -167,7 +177,7 @@ class _Walk:
 
     def __init__(self, document: Document, *, keep: bool, see_through: bool) -> None:
         self._document, self._see_through = document, see_through
-        self._keep = Keeping(document) if keep else None
+        self._keep = keep
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
@@ -193,17 +203,22 @@ class _Walk:
         try:
             step(*arguments)
         except ImageError as error:
-            if self._keep is None or unit.element is self._document.root:
+            if not self._keep or unit.element is self._document.root:
                 raise
             del self._todo[unit.depth :]
-            self._shapes[unit.first :] = [self._keep.part(unit.element, error)]
+            self._shapes[unit.first :] = [self._kept(unit.element, error)]
+
+    def _kept(self, element: Element, error: ImageError) -> Kept:
+        """Return a part for an element that cannot be read because of ``error``."""
+        texts = [self._document.css, *(child.get("style", "") for child in element.iter())]
+        return Kept(element, str(error), any("mix-blend-mode" in text for text in texts))
 
     def _enter(self, element: Element, context: _Context, unit: _Unit) -> None:
         tag = name_of(element)
         if tag not in VISITED and tag not in REFUSED:
             return
         if context.path:
-            self._add_linked(self._linked_size(element) + (len(element) if tag in DRAWN else 0))
+            self._add_linked(len(element) if tag in DRAWN else 0, element)
         style = self._document.style_in(element, context.style)
         if style["display"] == "none":
             return
@@ -216,20 +231,20 @@ class _Walk:
         matrix = product(context.matrix, transform)
         if determinant(matrix[:2, :2]) == 0:
             return
-        inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=context.depth + 1)
-        if tag == "g" and context.depth == 1 and LEVEL.fullmatch(element.get("id", "")):
-            inner = replace(inner, level=element.get("id", ""))
+        name = element.get("id", "")
+        level = name if tag == "g" and context.depth == 1 and LEVEL.fullmatch(name) else context.level
+        depth = context.depth + 1
+        inner = replace(context, style=style, matrix=matrix, viewport=viewport, depth=depth, level=level)
         clip = clip_rectangle(style["clip-path"], self._document, matrix, viewport)
         end = _End(unit, len(self._shapes), fraction(style["opacity"]), clip)
         if tag in DRAWN:
-            place = Placement(style, matrix, viewport, context.paints, bool(context.path))
             own = element if self._keep and not context.link else None
-            self._shapes += [
-                replace(shape, element=own, level=context.level)
-                for shape in element_shapes(element, self._document, place)
-            ]
+            shapes = element_shapes(element, self._document, inner)
+            self._shapes += [replace(shape, element=own, level=context.level) for shape in shapes]
             self._end(end)
             return
+        if inner.depth > MAX_DEPTH:
+            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
         self._todo.append(end)
         if tag == "use":
             self._link(element, inner, unit)
@@ -239,26 +254,22 @@ class _Walk:
             self._children(element, inner)
 
     def _children(self, element: Element, context: _Context) -> None:
-        _check_depth(context)
         if context.path:
             self._add_linked(len(element))
         self._todo.extend((child, context) for child in reversed(element))
 
-    def _linked_size(self, element: Element) -> int:
-        """Return how many elements the attributes of a linked one count as: none the first time."""
-        if element not in self._seen_linked:
+    def _add_linked(self, count: int, element: Element | None = None) -> None:
+        """Count linked elements; the attributes of an ``element`` count as well, but for the first time."""
+        if element in self._seen_linked:
+            count += sum(map(len, element.attrib.values())) // LINKED_CHARACTERS
+        elif element is not None:
             self._seen_linked.add(element)
-            return 0
-        return sum(map(len, element.attrib.values())) // LINKED_CHARACTERS
-
-    def _add_linked(self, count: int) -> None:
         self._linked += count
         if self._linked > MAX_LINKED:
             raise ImageError(f"links add up to more than {MAX_LINKED} elements")
 
     def _link(self, element: Element, context: _Context, unit: _Unit) -> None:
         """Follow a ``use``."""
-        _check_depth(context)
         if self._document.links_out(element):
             raise ImageError("uses an element of another file, not supported")
         target = self._document.linked(element)
@@ -273,7 +284,7 @@ class _Walk:
         path = (*context.path, target)
         inner = replace(context, path=path, paints=(fill, stroke), use_size=(None, None), link=unit)
         if tag == "symbol":
-            self._add_linked(self._linked_size(target))
+            self._add_linked(0, target)
             self._nested(element, inner, target, unit)
             return
         inner = replace(inner, matrix=product(context.matrix, translation(x, y)))
@@ -291,10 +302,8 @@ class _Walk:
         given = [attribute(element.attrib, name, viewport) for name in ("width", "height")]
         if is_svg:
             given = [b if b is not None else a for a, b in zip(given, context.use_size, strict=True)]
-        width, height = (
-            whole if size is None else size
-            for size, whole in zip(given, (viewport.width, viewport.height), strict=True)
-        )
+        sizes = zip(given, (viewport.width, viewport.height), strict=True)
+        width, height = (whole if size is None else size for size, whole in sizes)
         if not (width > 0 and height > 0):
             return
         style = context.style if is_svg else self._document.style_in(content, context.style)
@@ -304,12 +313,10 @@ class _Walk:
         box = view_box(content.attrib) if view is not None else None
         size = box[2:] if box else (width, height)
         matrix = product(context.matrix, translation(x, y))
-        if view is not None:
-            matrix = product(matrix, view)
+        matrix = matrix if view is None else product(matrix, view)
         is_clipped = not is_svg or None not in given or context.use_size != (None, None)
-        corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
         is_clipped = is_clipped and style["overflow"] not in {"visible", "auto"}
-        clip = moved(context.matrix, corners) if is_clipped else None
+        clip = moved(context.matrix, UNIT * [width, height] + [x, y]) if is_clipped else None
         opacity = 1.0 if is_svg else fraction(style["opacity"])
         self._todo.append(_End(unit, len(self._shapes), opacity, clip))
         viewport = replace(viewport, width=size[0], height=size[1])
@@ -322,17 +329,18 @@ class _Walk:
         Raises:
             ImageError: The shapes would look different.
         """
-        isolates = self._keep is not None and self._keep.isolates(end.unit.element)
+        isolates = "isolation" in self._document.css or "isolation" in end.unit.element.get("style", "")
+        isolates = self._keep and isolates
         if end.clip is None and end.opacity == 1 and not isolates:
             return
         parts = self._shapes[end.first :]
         self._work += len(parts) + (len(parts) ** 2 // PAIRS if end.opacity < 1 else 0)
         if self._work > MAX_WORK:
             raise ImageError("has too many shapes in nested groups with clips or opacity")
-        if self._keep:
-            parts = self._keep.inside(parts, end.clip)
-        elif end.clip is not None:
-            parts = [*clipped(shapes_of(parts), end.clip)]
+        if any(isinstance(part, Kept) and part.blends for part in parts):
+            raise ImageError("uses a blend mode in a group, not supported")
+        if end.clip is not None:
+            parts = list(self._clipped(parts, end.clip))
         if end.opacity < 1:
             shapes = shapes_of(parts)
             hides = end.opacity > 0 and not self._see_through and overlap(shapes)
@@ -341,6 +349,22 @@ class _Walk:
             faded = (replace(shape, opacity=shape.opacity * end.opacity) for shape in shapes)
             parts = [*faded] if end.opacity > 0 else []
         self._shapes[end.first :] = parts
+
+    def _clipped(self, parts: list[Part], clip: Points) -> Iterator[Part]:
+        """Yield the parts inside a convex polygon; elements that cannot be cut are kept if allowed."""
+        if not self._keep:
+            yield from clipped(shapes_of(parts), clip)
+            return
+        inside = {id(shape) for shape in within(shapes_of(parts), clip)}
+        for _, run in groupby(parts, lambda part: id(part.element)):
+            alike = list(run)
+            shapes, element = shapes_of(alike), alike[0].element
+            try:
+                yield from alike if inside.issuperset(map(id, shapes)) else clipped(shapes, clip)
+            except ImageError as error:
+                if element is None:
+                    raise
+                yield self._kept(element, error)
 
     def _background(self, matrix: Matrix, viewport: SvgViewport) -> None:
         """Add the root's ``background-color``, which is painted below all shapes."""
@@ -354,15 +378,9 @@ class _Walk:
             return
         box = view_box(self._document.root.attrib)
         x, y = box[:2] if box else (0.0, 0.0)
-        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [viewport.width, viewport.height] + [x, y]
-        self._shapes.append(
-            Shape([polygon(moved(matrix, corners))], FlatColor(*color), 1.0, None, Rule.NONZERO, is_rect=True)
-        )
-
-
-def _check_depth(context: _Context) -> None:
-    if context.depth > MAX_DEPTH:
-        raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        corners = UNIT * [viewport.width, viewport.height] + [x, y]
+        ring = polygon(moved(matrix, corners))
+        self._shapes.append(Shape([ring], FlatColor(*color), 1.0, None, is_rect=True))
 
 
 def _in_context(paint: str, context: tuple[str, str]) -> str:

@@ -74,26 +74,6 @@ def lengths(text: str, reference: float, name: str, font_size: float) -> list[fl
     return values
 
 
-def numbers(text: str) -> tuple[list[float], bool]:
-    """Return the numbers that a list begins with, and whether they are all of it."""
-    if not NUMBER.sub(" ", text).strip(", \t\r\n\f"):
-        return [float(value) for value in NUMBER.findall(text)], True
-    values: list[float] = []
-    position = after_space(text, 0)
-    while found := NUMBER.match(text, position):
-        values.append(float(found[0]))
-        position = after_space(text, found.end())
-    return values, False
-
-
-SPACE = re.compile(r"[\s,]*")
-
-
-def after_space(text: str, position: int) -> int:
-    """Return where white space and commas from ``position`` on end."""
-    return SPACE.match(text, position).end()  # type: ignore[union-attr]  # matches the empty text
-
-
 def fraction(text: str) -> float:
     """Return an opacity in [0, 1]: a number or a percentage; 1 for what is neither."""
     text = text.strip()
@@ -111,6 +91,9 @@ UNSURE = re.compile(
 """Colours that some viewers support, but resvg does not."""
 
 
+HEX = re.compile("#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
+
+
 def parse_color(text: str) -> tuple[Color, float] | None:
     """Return an SVG colour as sRGB in [0, 1], and its opacity; None for what is no colour.
 
@@ -120,22 +103,13 @@ def parse_color(text: str) -> tuple[Color, float] | None:
     name = text.strip().lower()
     if name == "transparent":
         return (0.0, 0.0, 0.0), 0.0
-    if name in ImageColor.colormap and name != "rebeccapurple":
-        red, green, blue = ImageColor.getrgb(name)[:3]
-        return (red / 255, green / 255, blue / 255), 1.0
-    color = _hex(name[1:]) if name.startswith("#") else _function(name)
+    if (name in ImageColor.colormap and name != "rebeccapurple") or HEX.fullmatch(name):
+        red, green, blue, alpha = (*ImageColor.getrgb(name), 255)[:4]
+        return (red / 255, green / 255, blue / 255), alpha / 255
+    color = _function(name)
     if color is None and UNSURE.match(name):
         raise ImageError(f"{text[:40]!r} is not a colour that is supported")
     return color
-
-
-def _hex(digits: str) -> tuple[Color, float] | None:
-    if len(digits) in {3, 4}:
-        digits = "".join(2 * digit for digit in digits)
-    if len(digits) not in {6, 8} or digits.strip("0123456789abcdef"):
-        return None
-    red, green, blue, alpha = bytes.fromhex(f"{digits}ff"[:8])
-    return (red / 255, green / 255, blue / 255), alpha / 255
 
 
 FUNCTION = re.compile(r"(rgb|hsl)a?\(([^()]*)\)")

@@ -11,6 +11,8 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +21,11 @@ import numpy.typing as npt
 import resvg_py
 from PIL import Image, PngImagePlugin
 
-from warpsplat.errors import ImageError, ResourceError, cause_of
+from warpsplat.errors import ImageError, ResourceError, Stopped, cause_of
+from warpsplat.native import available_cores
 from warpsplat.svg import draw_child
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
+from warpsplat.svg.write import OUR_HEAD, resized
 
 Pixels = npt.NDArray[np.float64]
 
@@ -53,26 +57,29 @@ def render_own(text: str) -> Image.Image:
         raise ImageError(f"cannot be rendered: resvg fails: {cause_of(error)[:200]}") from None
 
 
-def render_svg(
-    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
-) -> Image.Image:
+def render_svg(text: str, *, size: tuple[int, int] | None = None, zoom: float | None = None) -> Image.Image:
     """Return any SVG text rendered as by ``draw_png``."""
-    return _open(draw_png(text, width=width, height=height, zoom=zoom))
+    return _open(draw_png(text, size=size, zoom=zoom))
 
 
-def draw_png(
-    text: str, *, width: int | None = None, height: int | None = None, zoom: float | None = None
-) -> bytes:
-    """Return any SVG text as a PNG, at its own size, at a size in px, or magnified by ``zoom``.
+def draw_png(text: str, *, size: tuple[int, int] | None = None, zoom: float | None = None) -> bytes:
+    """Return any SVG text as a PNG, of a width and height [px], or magnified by ``zoom``.
 
     Raises:
         ImageError: Not an SVG, one that resvg does not accept or fails on, a picture of more than
             ``MAX_PIXELS``, or one that takes more time or memory than its size and length explain.
         ResourceError: No further process can be started.
     """
-    pixels = _shown_pixels(text, width, height, zoom)
+    own = svg_size(inspect_svg(text).root)
+    width, height = size or (None, None)
     options = {**OPTIONS, "width": width, "height": height, "zoom": zoom}
-    return _drawn("png", text, options, pixels)
+    return _drawn("png", text, options, float(size[0] * size[1]) if size else _pixels(own, zoom or 1.0))
+
+
+def _pixels(own: tuple[float, float] | None, zoom: float = 1.0) -> float:
+    """Return the number of pixels of a picture; 0 if its size is not known before rendering."""
+    # Unlike products, powers of floats raise OverflowError.
+    return max(own[0], 1.0) * max(own[1], 1.0) * zoom * zoom if own else 0.0
 
 
 def draw_pdf(text: str, *, zoom: float = 1.0) -> bytes:
@@ -82,7 +89,7 @@ def draw_pdf(text: str, *, zoom: float = 1.0) -> bytes:
     """
     own = svg_size(inspect_svg(text).root)
     width = own[0] * zoom * POINTS_PER_PIXEL if own else None
-    return _drawn("pdf", text, {"width": width}, _shown_pixels(text, None, None, None))
+    return _drawn("pdf", text, {"width": width}, _pixels(own))
 
 
 POINTS_PER_PIXEL = 72 / OPTIONS["dpi"]
@@ -90,6 +97,8 @@ POINTS_PER_PIXEL = 72 / OPTIONS["dpi"]
 
 def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> bytes:
     """Return the output of ``draw_child`` for ``text``, under limits for a picture of so many ``pixels``."""
+    if not pixels <= MAX_PIXELS:
+        raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
     seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
     memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
     options = {**options, "skip_system_fonts": TEXT.search(text) is None}
@@ -113,9 +122,8 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
         return done.stdout
     message = done.stderr.decode(errors="replace")
     if done.returncode == draw_child.REFUSED:
-        raise ImageError(
-            f"cannot be rendered: {(message.strip().splitlines() or ['no cause given'])[0][:200]}"
-        )
+        cause = (message.strip().splitlines() or ["no cause given"])[0]
+        raise ImageError(f"cannot be rendered: {cause[:200]}")
     if "memory allocation" in message or "MemoryError" in message:
         raise ImageError(f"cannot be rendered with {memory >> 20} MiB of memory")
     if -done.returncode in LIMIT_SIGNALS:
@@ -137,26 +145,6 @@ LIMIT_SIGNALS = (9, 24)
 """SIGKILL and SIGXCPU, which end a process at its limit of processor time."""
 
 
-def _shown_pixels(text: str, width: int | None, height: int | None, zoom: float | None) -> float:
-    """Return the number of pixels that ``draw_png`` draws; 0 if it is not known before rendering.
-
-    Raises:
-        ImageError: Not an SVG, or more than ``MAX_PIXELS``.
-    """
-    own = svg_size(inspect_svg(text).root)
-    if width and height:
-        pixels = float(width * height)
-    elif width or height:
-        raise ValueError("width and height go together")
-    else:
-        factor = zoom or 1.0
-        # Unlike products, powers of floats raise OverflowError.
-        pixels = max(own[0], 1.0) * max(own[1], 1.0) * factor * factor if own else 0.0
-    if not pixels <= MAX_PIXELS:
-        raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    return pixels
-
-
 def on_white(image: Image.Image) -> Pixels:
     """Return RGB in [0, 255], shape (height, width, 3), transparency composited on white."""
     rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
@@ -169,3 +157,71 @@ def premultiplied(image: Image.Image) -> Pixels:
     rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
     rgba[..., :3] *= rgba[..., 3:] / 255.0
     return rgba
+
+
+Bytes = npt.NDArray[np.uint8]
+Stop = Callable[[], bool]
+
+STRIP_PIXELS = 1 << 20
+"""Pixels of a strip."""
+
+WHOLE_PIXELS = 1 << 22
+"""Largest SVG that is drawn in one piece [pixels]. In strips, edges move by thousandths of a pixel, because a
+viewer clips curves at the border of its canvas; the PSNR changes by less than 0.0001 dB."""
+
+DRAWERS = 4
+"""Most strips that are drawn at once."""
+
+
+def check_stop(stop: Stop | None) -> None:
+    """Raise ``Stopped`` if ``stop`` returns true."""
+    if stop and stop():
+        raise Stopped
+
+
+def rows_of(width: int, height: int, overlap: int = 0) -> Iterator[slice]:
+    """Yield the rows of strips of ``STRIP_PIXELS`` from top to bottom, each up to ``overlap`` rows longer."""
+    step = max(1, STRIP_PIXELS // width)
+    for top in range(0, height - overlap, step):
+        yield slice(top, min(top + step + overlap, height))
+
+
+def draw(text: str, width: int, height: int, stop: Stop | None = None, *, own: bool = False) -> Bytes:
+    """Render an SVG with resvg at ``width`` x ``height`` px: sRGB and opacity, shape (height, width, 4).
+
+    Large files written here are drawn in strips, others in one piece. ``own``: this program wrote the text
+    just now, so that it needs no precautions.
+
+    Raises:
+        ImageError: Not an SVG, or one of other proportions.
+        Stopped: ``stop`` returned true.
+    """
+    check_stop(stop)
+    head = OUR_HEAD.match(text)
+    cuttable = head is not None and (int(head[1]), int(head[2])) == (width, height)
+
+    def drawn(text: str, height: int) -> Bytes:
+        image = render_own(text) if own else render_svg(text, size=(width, height))
+        if image.size != (width, height):
+            size = f"{image.width}x{image.height}"
+            raise ImageError(f"renders as {size}, the image has {width}x{height} pixels")
+        return np.asarray(image.convert("RGBA"))
+
+    if not cuttable or width * height <= WHOLE_PIXELS:
+        return drawn(text, height)
+
+    def strip(rows: slice) -> Bytes:
+        check_stop(stop)
+        tall = rows.stop - rows.start
+        return drawn(resized(text, width, tall, 1.0, rows.start), tall)
+
+    out = np.empty((height, width, 4), np.uint8)
+    strips = list(rows_of(width, height))
+    with ThreadPoolExecutor(min(DRAWERS, available_cores())) as drawers:
+        try:
+            for rows, part in zip(strips, drawers.map(strip, strips), strict=True):
+                out[rows] = part
+        except BaseException:
+            drawers.shutdown(wait=False, cancel_futures=True)
+            raise
+    return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from xml.sax.saxutils import escape
 
@@ -16,13 +16,12 @@ from warpsplat.portable.elementary import power_of_ten
 from warpsplat.scene import ATTRIBUTES, NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.data import PathData, held_points
+from warpsplat.svg.data import held_points, path_data, units
 from warpsplat.svg.groups import LEVEL_ID, Names, PathElement, color_names, nested, painted
+from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
-
-NAMESPACE = "http://www.w3.org/2000/svg"
 
 OPACITY_DECIMALS = 2
 """Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
@@ -51,8 +50,7 @@ def width_decimals(per_pixel: float) -> int:
 
 def rounded(scene: Scene, per_pixel: float) -> Scene:
     """Return ``scene`` rounded as a file with ``per_pixel`` units to a pixel has it."""
-    spline = np.repeat(scene.basis, scene.point_counts()) == Basis.SPLINE
-    per_unit = np.where(spline, per_pixel / 2, per_pixel)[:, None]
+    per_unit = units(scene, per_pixel)
     points, colors, opacities, widths = (
         values.astype(np.float64) for values in (scene.points, scene.colors, scene.opacities, scene.widths)
     )
@@ -69,35 +67,31 @@ def rounded(scene: Scene, per_pixel: float) -> Scene:
     )
 
 
-BLACK = "#000"
-"""SVG's default for fills."""
-
 PAINTED = {Kind.FILL: "fill", Kind.STROKE: "stroke"}
 """The paint attribute of each kind."""
 
-BLACK_FILL = f' fill="{BLACK}"'
+BLACK_FILL = ' fill="#000"'
+"""SVG's default for fills."""
 
 
 class _Paths:
     """The path elements of a scene's shapes."""
 
-    def __init__(
-        self, scene: Scene, per_pixel: float, ramps: Mapping[int, str], opacity_scale: float = 1.0
-    ) -> None:
+    def __init__(self, scene: Scene, per_pixel: float, ramps: dict[int, str], opacity_scale: float) -> None:
         """``ramps``: identifiers of gradients by shape; the rest is as for ``write_svg``."""
         self._scene, self._per_pixel = scene, per_pixel
-        self._data = PathData(scene, per_pixel)
+        self._data = list(path_data(scene, per_pixel))
         self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
         for shape, name in ramps.items():
             colors[shape] = f"url(#{name})"
-        self._paints = [PAINTED[Kind(kind)] for kind in scene.kind.tolist()]
-        self._colors = [f' {paint}="{color}"' for paint, color in zip(self._paints, colors, strict=True)]
+        paints = [PAINTED[Kind(kind)] for kind in scene.kind.tolist()]
+        self._colors = [f' {paint}="{color}"' for paint, color in zip(paints, colors, strict=True)]
         shown = np.minimum(scene.opacities.astype(np.float64) * opacity_scale, 1.0).tolist()
         self._opacities = [
             f' {paint}-opacity="{number(value, OPACITY_DECIMALS)}"' if value < OPAQUE else ""
-            for paint, value in zip(self._paints, shown, strict=True)
+            for paint, value in zip(paints, shown, strict=True)
         ]
 
     def of(self, shape: int, *, in_group: bool, name: str = "", alone: bool = False) -> PathElement:
@@ -105,30 +99,25 @@ class _Paths:
 
         ``in_group``: the path is in a group of strokes. ``name``: the identifier's attribute.
         """
-        opacity, paint, data = self._opacities[shape], self._colors[shape], self._data.of(shape)
-        own = name
+        opacity, paint, own = self._opacities[shape], self._colors[shape], name
         if self.has_twin[shape] and not alone:
-            opacity += self._opacities[shape + 1]
-            own += self._twin(shape + 1)
+            twin = shape + 1
+            opacity += self._opacities[twin]
+            own += self._colors[twin] + self._style(twin, in_group=False)
+            own += "" if self._scene.kind[twin] == Kind.STROKE else ' paint-order="stroke"'
+        style = self._style(shape, in_group=in_group)
         if self._scene.kind[shape] == Kind.STROKE:
-            return PathElement(data, (opacity, paint, self._line(shape, in_group=in_group)), own)
-        paint = "" if paint == BLACK_FILL else paint
-        return PathElement(data, (opacity, paint, ""), self._rule(shape) + own)
+            return PathElement(self._data[shape], (opacity, paint, style), own)
+        return PathElement(
+            self._data[shape], (opacity, "" if paint == BLACK_FILL else paint, ""), style + own
+        )
 
-    def _twin(self, twin: int) -> str:
-        """Return the attributes that draw a twin with the path of the shape before."""
-        if self._scene.kind[twin] == Kind.STROKE:
-            return self._colors[twin] + self._line(twin, in_group=False)
-        return f'{self._colors[twin]}{self._rule(twin)} paint-order="stroke"'
-
-    def _rule(self, shape: int) -> str:
-        return ' fill-rule="evenodd"' if self._scene.rule[shape] == Rule.EVENODD else ""
-
-    def _line(self, shape: int, *, in_group: bool) -> str:
-        """Return the attributes of a stroke, besides those of the group of strokes if it is ``in_group``."""
+    def _style(self, shape: int, *, in_group: bool) -> str:
+        """Return the attributes besides paint; those of the group of strokes are left out if ``in_group``."""
+        if self._scene.kind[shape] == Kind.FILL:
+            return ' fill-rule="evenodd"' if self._scene.rule[shape] == Rule.EVENODD else ""
         scene, per_pixel = self._scene, self._per_pixel
-        width = number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))
-        style = f' stroke-width="{width}"'
+        style = f' stroke-width="{number(float(scene.widths[shape]) * per_pixel, width_decimals(per_pixel))}"'
         cap, join, dash = Cap(scene.cap[shape]), Join(scene.join[shape]), int(scene.dash[shape])
         shared_cap, shared_join = (Cap.ROUND, Join.ROUND) if in_group else (Cap.BUTT, Join.MITER)
         if cap != shared_cap:
@@ -146,17 +135,15 @@ class _Paths:
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     """Return the bytes of each shape alone in a file with ``per_pixel`` units to a pixel, shape (shape,)."""
-    paths = _Paths(scene, per_pixel, gradients(scene, per_pixel)[1])
+    paths = _Paths(scene, per_pixel, gradients(scene, per_pixel)[1], 1.0)
     sizes = [len(str(paths.of(shape, in_group=True, alone=True))) for shape in range(len(scene))]
     return np.array(sizes, np.int64)
 
 
 def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
     """Return the markup of a picture, in the file's units."""
-    across, down = (
-        per_pixel * side / own
-        for side, own in zip((scene.canvas.width, scene.canvas.height), picture.size, strict=True)
-    )
+    across = per_pixel * scene.canvas.width / picture.size[0]
+    down = per_pixel * scene.canvas.height / picture.size[1]
     return f'<g transform="scale({across:.9g} {down:.9g})">{picture.markup}</g>'
 
 
@@ -191,8 +178,8 @@ def _groups(scene: Scene, paths: _Paths, per_pixel: float, ids: bool) -> Iterato
             continue
         elements = [paths.of(i, in_group=in_group, name=attributes[i]) for i in shapes]
         elements = _joined(scene, shapes, elements)
-        by_color = ids and not scene.layer_names
-        inner = painted(elements, [called[i] for i in shapes], group_names) if by_color else nested(elements)
+        named = ids and not scene.layer_names
+        inner = painted(elements, [called[i] for i in shapes], group_names) if named else nested(elements)
         yield from (f"<g {STROKE_ATTRIBUTES}>", *inner, "</g>") if in_group else inner
     if last is not None:
         yield "</g>"
@@ -240,11 +227,10 @@ def write_svg(
     Shapes with very many nodes become several paths (``in_parts``).
 
     Args:
-        scene: What to write; canvas units become user units.
+        scene: What to write.
         per_pixel: Units of the view box to a pixel. Coordinates are whole units, those of splines even ones.
         metadata: Text behind the program's name in the comment that marks the file.
-        opacity_scale: Factor on the opacity of solid paths. A splat's plateau is a little below 1
-            (``constants.PLATEAU``): a solid path needs that much less opacity to look the same.
+        opacity_scale: Factor on opacities: a splat's plateau is a little below 1 (``constants.PLATEAU``).
         background: Whether to write the canvas's background.
         title: Title of the picture; empty: none.
         ids: Whether paths, and groups of neighbours of one colour, have identifiers after their colours.
@@ -258,8 +244,7 @@ def write_svg(
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
     behind = ""
     if background and canvas.background is not None:
-        fill = hex_colors(canvas.background[None])[0]
-        paint = "" if fill == BLACK else f' fill="{fill}"'
+        paint = f' fill="{hex_colors(canvas.background[None])[0]}"'.replace(BLACK_FILL, "")
         behind = f'<rect width="{width}" height="{height}"{paint}/>'
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
@@ -267,11 +252,9 @@ def write_svg(
     shapes = "".join(_groups(scene, paths, per_pixel, ids))
     if canvas.crisp and len(scene):
         shapes = f'<g shape-rendering="crispEdges">{shapes}</g>'
-    return (
-        f'<svg xmlns="{NAMESPACE}" width="{canvas.width}" height="{canvas.height}" '
-        f'viewBox="0 0 {width} {height}">{MARK}{" " if metadata else ""}{metadata}-->\n'
-        f"{titled(title)}{defs}{behind}{shapes}</svg>\n"
-    )
+    head = head_of(canvas.width, canvas.height, f"0 0 {width} {height}")
+    mark = f"{MARK}{' ' if metadata else ''}{metadata}-->"
+    return f"{head}{mark}\n{titled(title)}{defs}{behind}{shapes}</svg>\n"
 
 
 def _check_finite(scene: Scene) -> None:
@@ -280,13 +263,12 @@ def _check_finite(scene: Scene) -> None:
     if background is not None and not np.isfinite(background).all():
         raise UsageError("the background has a number that is not finite")
     shapes = np.arange(len(scene))
-    owners = {"shape": shapes, "point": np.repeat(shapes, scene.point_counts())}
-    owners["stop"] = np.repeat(shapes, np.diff(scene.stop_first))
+    counts = {"point": scene.point_counts(), "stop": np.diff(scene.stop_first)}
     for attribute in ATTRIBUTES:
         values = getattr(scene, attribute.name)
         if not np.isfinite(values).all():
-            rows = np.isfinite(values).reshape(len(values), -1).all(axis=1)
-            shape = int(owners[attribute.per][np.flatnonzero(~rows)[0]])
+            row = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))[0]
+            shape = np.repeat(shapes, counts.get(attribute.per, 1))[row]
             raise UsageError(f"shape {shape}: {attribute.name} with a number that is not finite")
 
 
@@ -302,9 +284,12 @@ def titled(title: str) -> str:
     return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
 
 
-HEAD = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" width="(\d+)" height="(\d+)" viewBox="0 0 ([\d.]+) ([\d.]+)">'
-)
+def head_of(width: object, height: object, view: str) -> str:
+    """Return the start tag of a file: a size, and the view box."""
+    return f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">'
+
+
+HEAD = re.compile(head_of(r"(\d+)", r"(\d+)", r"0 0 ([\d.]+) ([\d.]+)"))
 OUR_HEAD = re.compile(HEAD.pattern + MARK)
 """The beginning of a file written here: its size in pixels, and in units of its view box."""
 
@@ -322,8 +307,7 @@ def resized(text: str, width: int, height: int, scale: float, top: int = 0) -> s
     found = own_head(text)
     unit = float(found[3]) / float(found[1]) / scale
     view = f"0 {top * unit:.9g} {width * unit:.9g} {height * unit:.9g}"
-    head = f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="{view}">'
-    return head + text[found.end() :]
+    return head_of(width, height, view) + text[found.end() :]
 
 
 def read_metadata(text: str) -> str:
@@ -342,7 +326,7 @@ SHORT = 1500
 """Files of fewer characters have no comment: the order of attributes marks them (see ``files.marks``)."""
 
 SHORT_HEAD = re.compile(
-    rf'<svg viewBox="0 0 ([\d.]+) ([\d.]+)" xmlns="{re.escape(NAMESPACE)}" height="(\d+)" width="(\d+)">'
+    rf'<svg viewBox="(0 0 [\d.]+ [\d.]+)" xmlns="{NAMESPACE}" height="(\d+)" width="(\d+)">'
 )
 """The beginning of a short file."""
 
@@ -360,10 +344,4 @@ def shortened(text: str) -> str:
 def _plain(text: str) -> str:
     """Return a short file with its comment again; any other as it is."""
     head = SHORT_HEAD.match(text)
-    if not head:
-        return text
-    *box, height, width = head.groups()
-    return (
-        f'<svg xmlns="{NAMESPACE}" width="{width}" height="{height}" viewBox="0 0 {" ".join(box)}">'
-        f"{MARK}-->\n{text[head.end() :]}\n"
-    )
+    return f"{head_of(head[3], head[2], head[1])}{MARK}-->\n{text[head.end() :]}\n" if head else text

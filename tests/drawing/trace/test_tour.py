@@ -76,7 +76,7 @@ def test_rings_begin_where_the_pen_comes_by() -> None:
     turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     ring = np.stack([50 + 20 * np.cos(turn), 50 + 20 * np.sin(turn)], axis=1).astype(np.float32)
     line = np.stack([np.linspace(0, 29, 4), np.full(4, 50)], axis=1).astype(np.float32)
-    scene = Scene.of(
+    scene = Scene(
         CANVAS,
         np.full(2, Kind.STROKE, np.int32),
         np.array([0, 4, 16], np.int32),

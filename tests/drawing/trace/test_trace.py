@@ -12,7 +12,7 @@ from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.trace import Traced, trace, trace_regions
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray, Paint
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 from warpsplat.svg.write import write_svg
 
 

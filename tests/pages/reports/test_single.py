@@ -30,8 +30,8 @@ from warpsplat.pages.reports.shapes import contributions, matched
 from warpsplat.pages.reports.single import Facts, headline, notes, plots, report_page, table
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.render import to_pillow
-from warpsplat.svg.read_kept import load_kept
-from warpsplat.svg.strips import draw
+from warpsplat.svg.read import load_kept
+from warpsplat.svg.viewer import draw
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="48" height="32" viewBox="0 0 48 32">'

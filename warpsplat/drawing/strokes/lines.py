@@ -112,7 +112,7 @@ def _scene(canvas: Canvas, strokes: list[_Stroke], fitted: list[Pieces], pens: F
         for stroke, pieces in zip(strokes, fitted, strict=True)
     ]
     owner = np.array([stroke.pen for stroke in strokes], np.int32)
-    return Scene.of(
+    return Scene(
         canvas,
         np.full(len(strokes), Kind.STROKE, np.int32),
         starts_of(np.array([len(points) for points in chains], np.int64)),

@@ -11,7 +11,7 @@ from warpsplat.drawing.trace.curves import Pieces, straight
 from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene.joints import Joint
+from warpsplat.scene.attributes import Joint
 
 OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees

@@ -174,7 +174,7 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
     flat = list(itertools.chain.from_iterable(contours))
     count = len(contours)
     ground = np.asarray(background, np.float32) if is_opaque else None
-    scene = Scene.of(
+    scene = Scene(
         # Adjacent shapes that are antialiased show what is behind them, at zooms where cells end in pixels.
         Canvas(width, height, ground, crisp=count > 1),
         np.full(count, Kind.FILL, np.int32),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import OutlineTracer
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
-from warpsplat.scene.scene import IntArray, starts_of
+from warpsplat.scene.scene import starts_of
 
 OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
 MOST_REGIONS = 3000  # of any image; one with more is no drawing
@@ -132,7 +133,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     colors = np.array([shape.coloring.color for shape in shapes]).reshape(-1, 4)
     has_ramp = np.array([shape.coloring.ramp is not None for shape in shapes], np.bool_)
     joints = np.concatenate([*map(joints_of, contours), np.zeros(0, np.int32)])
-    scene = Scene.of(
+    scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
         starts_of(by_shape),
@@ -148,7 +149,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     return Traced(scene, joints.astype(np.int32), np.full(len(joints), -1, np.int32))
 
 
-def _paints(shapes: list[Fill]) -> dict[str, IntArray | FloatArray]:
+def _paints(shapes: list[Fill]) -> dict[str, Any]:
     """Return the gradients as fields of a ``Scene``."""
     ramps = [shape.coloring.ramp for shape in shapes]
     known = [ramp for ramp in ramps if ramp is not None]

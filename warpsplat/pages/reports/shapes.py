@@ -17,7 +17,7 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import OPACITY_RANGE, FloatArray, Kind, Paint, Scene
 from warpsplat.svg.document import Document, Element
 from warpsplat.svg.numbers import hex_colors
-from warpsplat.svg.read_kept import KeptScene
+from warpsplat.svg.read import KeptScene
 
 ROUNDING = 1 / (12 * 255**2)
 """Mean squared error of rounding to 8 bits: an exact file has a finite PSNR by it."""
@@ -131,11 +131,10 @@ def _colors(scene: Scene) -> list[list[str]]:
 def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
     """Return the layer of each shape, and the names: those of groups, or parts in painter's order."""
     count = len(base.scene)
-    if base.document is not None:
-        named = _named_groups(base.document, base.elements)
-        names = list(dict.fromkeys(named))
-        if 1 < len(names) <= MOST_LAYERS:
-            return [names.index(name) for name in named], names
+    named = _named_groups(base.document, base.elements)
+    names = list(dict.fromkeys(named))
+    if 1 < len(names) <= MOST_LAYERS:
+        return [names.index(name) for name in named], names
     parts = min(PARTS, count)
     layers: npt.NDArray[np.intp] = np.arange(count) * parts // max(count, 1)
     ends = np.searchsorted(layers, np.arange(parts), "right")
