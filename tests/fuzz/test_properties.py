@@ -22,8 +22,8 @@ from tests.fuzz.drawings import drawings
 from tests.fuzz.vocabulary import HEIGHT, NUMBERS, WIDTH
 from warpsplat.errors import ImageError, OutputError, UsageError, explain
 from warpsplat.extensions import renderer_names
-from warpsplat.files.image import load_image
 from warpsplat.files.output import check_output, write_atomically
+from warpsplat.files.sources import image_of
 from warpsplat.fit.options import parse_bytes, parse_duration
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import psnr
@@ -106,7 +106,7 @@ def assert_named(error: ImageError) -> None:
 
 
 def load(pixels: np.ndarray, form: str) -> np.ndarray:
-    return load_image(saved(Image.fromarray(pixels), form), "made up")
+    return image_of(saved(Image.fromarray(pixels), form), "made up", paper=1.0)
 
 
 shapes = st.tuples(st.integers(2, 20), st.integers(2, 20))
@@ -157,7 +157,7 @@ def test_floats_are_pixels_or_refused(pixels: np.ndarray) -> None:
 )
 def test_bytes_are_an_image_or_refused(head: bytes, rest: bytes) -> None:
     try:
-        assert load_image(head + rest, "made up").ndim == 3
+        assert image_of(head + rest, "made up").ndim == 3
     except ImageError as error:
         assert_named(error)
 

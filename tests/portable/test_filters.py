@@ -58,11 +58,6 @@ def test_blurred_as_by_opencv(name: str, border: filters.Border, sigma: float) -
     assert_near(filters.gaussian_blur(IMAGES[name], sigma, border), theirs)
 
 
-def test_blurred_by_a_kernel_of_a_size() -> None:
-    image = IMAGES["40x53"]
-    assert_near(filters.gaussian_blur(image, 1.5, size=11), cv2.GaussianBlur(image, (11, 11), 1.5))
-
-
 @pytest.mark.parametrize("name", IMAGES)
 @pytest.mark.parametrize("size", [1, 3, 4, 9, 15])
 def test_boxes_as_by_opencv(name: str, size: int) -> None:
