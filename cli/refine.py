@@ -15,7 +15,7 @@ from warpsplat.cli.options import (
     Request,
     checkpoint_options,
     overwrite_option,
-    refine_options,
+    quality_options,
     run_options,
 )
 from warpsplat.errors import UsageError
@@ -45,7 +45,7 @@ from warpsplat.fit.settings import make_settings
 @click.option(
     "--max-memory", metavar="SIZE", help="Memory limit, such as 4GB; an image that needs more is refused."
 )
-@refine_options
+@quality_options(refine=True)
 @click.option(
     "--keep",
     is_flag=True,
@@ -77,18 +77,13 @@ def command(
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_exceptions, leave, progress_bar, summary
-    from warpsplat.cli.signals import Interrupt
+    from warpsplat.cli.run import echo_exceptions, leave, summary, watched
     from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
     shown = read_input(image) if hooks.need_image() else image
-    interrupt = Interrupt()
-    with (
-        interrupt.watching(),
-        progress_bar(svg, settings, quiet=request.quiet, verbose=request.verbose) as report,
-    ):
+    with watched(request, svg) as (report, stop):
         result = refine(
             data,
             shown,
@@ -98,7 +93,7 @@ def command(
             device=request.device,
             threads=request.threads,
             callback=hooks.watch(report),
-            stop=interrupt,
+            stop=stop,
             name=input_name(svg),
             checkpoint=checkpoint,
             resume=resume,

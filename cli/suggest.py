@@ -47,11 +47,11 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     from warpsplat.run.options import settings_from
     from warpsplat.run.suggest import check_suggesting, suggest
 
-    image, _ = request.image, request.inputs
+    image = request.inputs[0]
     settings = settings_from(given)
     check_suggesting(settings)
     data = read_input(image)
-    with watched(request, settings) as (report, stop):
+    with watched(request, image) as (report, stop):
         made = suggest(data, settings=settings, callback=report, stop=stop, **request.source)
     if made is None:
         raise click.Abort  # prints "interrupted"

@@ -16,8 +16,8 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
+    quality_options,
     run_options,
-    several_quality_options,
 )
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.errors import UsageError
@@ -35,7 +35,7 @@ from warpsplat.run.options import settings_from
     " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@several_quality_options
+@quality_options(several=True)
 @importance_option
 @checkpoint_options
 @hook_options("vectorize")
@@ -115,12 +115,11 @@ def single(
     inputs, data = request.inputs, read_input(image)
     output = request.output or Path(image.name).with_suffix(".svg")
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_notes, echo_start, leave, requested, summary, watched
+    from warpsplat.cli.run import echo_notes, leave, requested, summary, watched
     from warpsplat.run.command_line import vectorize_command
     from warpsplat.run.vectorize import vectorize
 
-    echo_start(request, requested(settings))
-    with watched(request, settings) as (report, stop):
+    with watched(request, image, requested(settings)) as (report, stop):
         result = vectorize(
             data,
             settings=settings,
