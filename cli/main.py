@@ -26,7 +26,7 @@ COMMANDS: dict[str, Command] = {
     "refine": Command("Improve an SVG against an image.", "warpsplat.cli.refine:command"),
     "eval": Command("Measure any SVG against an image.", "warpsplat.cli.evaluate:command"),
     "render": Command("Render an SVG to a PNG.", "warpsplat.cli.render:command"),
-    **dict(declared("commands")),
+    **declared("commands"),
 }
 """All commands: those of the core, then those of the extensions."""
 

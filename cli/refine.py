@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     FILE,
@@ -77,7 +75,7 @@ def command(
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_exceptions, leave, summary, watched
+    from warpsplat.cli.run import echo_exceptions, finish, watched
     from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
@@ -107,12 +105,8 @@ def command(
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
-    if request.as_json:
-        echo(json.dumps({**values, **hooks.as_dict()}), err=output == STANDARD)
-    elif not request.quiet:
-        echo(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
     from warpsplat.run.command_line import refine_command
 
     line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
-    hooks.finish(Done(request, shown, [(output, result)], line))
-    leave(result)
+    done = Done(request, shown, [(output, result)], line)
+    finish(done, hooks, values, note=f" (before: {before:.2f} dB)", aside=output == STANDARD)

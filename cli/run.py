@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import sys
 import time
@@ -13,6 +14,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.options import Request
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
@@ -131,8 +133,18 @@ def echo_exceptions(name: str, result: Result) -> None:
         echo(f"warpsplat: {name}: {note}", err=True)
 
 
-def leave(result: Result) -> None:
-    """Print missed goals, and end the program with the exit code for them, if there are any."""
+def finish(done: Done, hooks: Hooks, values: dict[str, Any], *, note: str = "", aside: bool) -> None:
+    """Print the figures ``values`` of a file, on stderr if ``aside``, and missed goals; have hooks finish.
+
+    Ends the program with the exit code for missed goals, if there are any.
+    """
+    ((output, result),) = done.made
+    assert isinstance(result, Result)
+    if done.request.as_json:
+        echo(json.dumps({**values, **hooks.as_dict()}), err=aside)
+    elif not done.request.quiet:
+        echo(summary(output, values) + note, err=aside)
+    hooks.finish(done)
     for goal in result.missed:
         echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:

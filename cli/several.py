@@ -35,11 +35,7 @@ COLUMNS = (
 
 
 def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any], hooks: Hooks) -> None:
-    """Make a file for each number of shapes, and print their figures.
-
-    Raises:
-        WarpsplatError: what cannot be done; found before the run, as far as possible.
-    """
+    """Make a file for each number of shapes, and print their figures."""
     inputs, image = request.inputs, request.image
     settings = settings_from({**given, "curves": max(numbers)})
     check_several(settings, numbers)

@@ -31,12 +31,7 @@ TWICE = 1.9
 
 
 def suggest_number(request: Request, given: dict[str, Any]) -> None:
-    """Print a suggestion, its reasons, and the command that follows it.
-
-    Raises:
-        UsageError: settings that fix the number of shapes, or an output.
-        Abort: interrupted.
-    """
+    """Print a suggestion, its reasons, and the command that follows it."""
     if request.output:
         raise UsageError(NOTHING_ELSE)
     if given["curves"] is not None:
