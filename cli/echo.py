@@ -11,26 +11,20 @@ from collections.abc import Iterator
 import click
 
 from warpsplat.errors import OutputError, printable
-from warpsplat.native import write_message
+from warpsplat.native import discard_output, write_message
 
 
 def open_standard_streams() -> None:
     """Open descriptors 0, 1 and 2 if they are closed, or the next file opened would get such a number."""
-    for number, name in ((0, "stdin"), (1, "stdout"), (2, "stderr")):
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:
             os.fstat(number)
         except OSError:
-            nowhere = os.open(os.devnull, os.O_RDONLY if number == 0 else os.O_WRONLY)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
+            os.open(os.devnull, os.O_RDWR)  # becomes the lowest free number, which is this one
         if getattr(sys, name) is None:
-            setattr(
-                sys, name, os.fdopen(number, "r" if number == 0 else "w", encoding="utf-8", closefd=False)
-            )
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure = getattr(stream, "reconfigure", None)
-        if reconfigure:  # characters that the terminal's encoding lacks are escaped
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
+        reconfigure = getattr(getattr(sys, name), "reconfigure", None)
+        if mode == "w" and reconfigure:  # characters that the terminal's encoding lacks are escaped
             reconfigure(errors="backslashreplace")
 
 
@@ -56,9 +50,7 @@ def echo(text: str, *, err: bool = False) -> None:
 def silence(stream: object) -> None:
     """Discard what is left in a stream's buffer and all further output."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]
-        os.close(nowhere)
+        discard_output(stream.fileno())  # type: ignore[attr-defined]
 
 
 class _Notices(logging.Handler):

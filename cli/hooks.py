@@ -7,19 +7,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import click
 
+from warpsplat.cli.options import Function, Request, together
 from warpsplat.errors import UsageError
 from warpsplat.extensions import extensions, load
 
 if TYPE_CHECKING:
-    from warpsplat.cli.options import Request
     from warpsplat.fit.progress import Progress
     from warpsplat.run.result import Result
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 Mode = Literal["one file", "several images", "several numbers", "suggestion"]
 """The output that a command line asks for."""
@@ -42,7 +40,7 @@ class Done:
     made: Sequence[tuple[Path, Result | bytes | Path]]
     """Files with their results; of ``eval``, the SVG that was measured."""
     command: str = ""
-    """A command line that repeats it."""
+    """The command line that repeats it."""
     several: bool = False
     """Whether several numbers of shapes were asked for."""
 
@@ -69,11 +67,7 @@ class RunHook:
         return None
 
     def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
-        """Check before the run that what is asked for can be done.
-
-        Raises:
-            UsageError: it cannot.
-        """
+        """Raise ``UsageError`` before the run if what is asked for cannot be done."""
 
     def needs_image(self) -> bool:
         """Return whether ``Done.data`` has to be the image's bytes."""
@@ -104,14 +98,7 @@ def hooks_of(command: str) -> Iterable[type[RunHook]]:
 
 def hook_options(command: str) -> Callable[[Function], Function]:
     """Return a decorator that adds the options of all hooks of a command."""
-
-    def decorate(function: Function) -> Function:
-        options = [option for hook in hooks_of(command) for option in hook.options.values()]
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return decorate
+    return together(*(option for hook in hooks_of(command) for option in hook.options.values()))
 
 
 class HookedCommand(click.Command):
@@ -137,11 +124,7 @@ class Hooks:
             self._hooks.append(hook(**values))
 
     def check_mode(self, mode: Mode) -> None:
-        """Check that the options that were given are possible in a mode.
-
-        Raises:
-            UsageError: one is not.
-        """
+        """Raise ``UsageError`` if an option that was given is not possible in a mode."""
         for hook in self._hooks:
             if mode not in hook.modes and (flag := hook.flag()):
                 raise UsageError(f"{flag} takes {TAKES[mode]}")
@@ -154,11 +137,7 @@ class Hooks:
     def check_files(
         self, inputs: Sequence[Path], output: Path, checkpoint: Path | None, *, overwrite: bool
     ) -> None:
-        """Check before a run that it can write its result and its checkpoint, then ``check``.
-
-        Raises:
-            UsageError: it cannot, or may not.
-        """
+        """Check before a run that the result and the checkpoint can be written, then ``check``."""
         from warpsplat.files.output import check_output
         from warpsplat.run.formats import ENDINGS, check_format
 

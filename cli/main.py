@@ -16,8 +16,8 @@ from typing import Any, Literal, NoReturn
 import click
 
 from warpsplat._version import __version__
-from warpsplat.cli import signals
 from warpsplat.cli.echo import echo, notices, open_standard_streams, silence
+from warpsplat.cli.signals import Interrupt, handled, leave_compiler
 from warpsplat.errors import LONGEST_MESSAGE, ExitCode, OutputError, cut, explain, printable
 from warpsplat.extensions import Command, declared, load
 
@@ -26,17 +26,15 @@ COMMANDS: dict[str, Command] = {
     "refine": Command("Improve an SVG against an image.", "warpsplat.cli.refine:command"),
     "eval": Command("Measure any SVG against an image.", "warpsplat.cli.evaluate:command"),
     "render": Command("Render an SVG to a PNG.", "warpsplat.cli.render:command"),
-    **dict(declared("commands")),
+    **declared("commands"),
 }
 """All commands: those of the core, then those of the extensions."""
 
 
-FOR_FILES = {
-    ".svg": ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg"),
-    ".yaml": ("batch FILE.yaml",),
-}
+FOR_SVG = ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg")
+FOR_YAML = ("batch FILE.yaml",)
+FOR_FILES = {".svg": FOR_SVG, ".svgz": FOR_SVG, ".yaml": FOR_YAML, ".yml": FOR_YAML}
 """Commands for files that are not images."""
-FOR_FILES[".svgz"], FOR_FILES[".yml"] = FOR_FILES[".svg"], FOR_FILES[".yaml"]
 
 
 class LazyGroup(click.Group):
@@ -48,10 +46,7 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command, or None for an unknown name."""
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = load(COMMANDS[cmd_name].target)
-        return command
+        return load(COMMANDS[cmd_name].target) if cmd_name in COMMANDS else None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -117,7 +112,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     code: Any = ExitCode.INTERNAL
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        with signals.handled():
+        with handled():
             open_standard_streams()
             with notices():
                 code = cli.main(args=arguments, prog_name="warpsplat", standalone_mode=False) or 0
@@ -126,10 +121,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = error.code
     except BaseException as error:
         code = report_error(error, json_stream(given))
-    number = signals.received()
-    if number:
-        code = 128 + number
-        signals.leave_compiler(code)
+    if Interrupt.received:
+        code = 128 + Interrupt.received
+        leave_compiler(code)
     sys.exit(int(code or 0))
 
 
@@ -170,7 +164,7 @@ QUOTED = re.compile(r"""(["'])([^"']*)\1""")
 
 def message_of(error: BaseException) -> tuple[str, int]:
     """Return the message for an exception, and the exit code."""
-    number = signals.received() or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
+    number = Interrupt.received or (signal.SIGINT if isinstance(error, KeyboardInterrupt) else None)
     if os.environ.get("WARPSPLAT_TRACEBACK"):
         traceback.print_exception(error)
     if number or isinstance(error, click.exceptions.Abort):
@@ -186,7 +180,3 @@ def message_of(error: BaseException) -> tuple[str, int]:
             message = QUOTED.sub(lambda found: f"{found[1]}{cut(found[2])}{found[1]}", message)
         return printable(cut(message, LONGEST_MESSAGE)) + help_of, error.exit_code
     return explain(error)
-
-
-if __name__ == "__main__":
-    main()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -42,51 +41,58 @@ overwrite_option = click.option(
 )
 
 
-def decorated(function: Function, options: Iterable[Callable[[Function], Function]]) -> Function:
-    """Return a function with options, in the order of its help."""
-    for option in reversed([*options]):
-        function = option(function)
-    return function
+def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Return a decorator that adds options, in the order of the help."""
+
+    def decorate(function: Function) -> Function:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
 
 
-def checkpoint_options(function: Function) -> Function:
-    """Add the options of checkpoints, which are keywords of ``warpsplat.vectorize``."""
-    options = [
-        click.option(
-            "--checkpoint",
-            type=FILE,
-            metavar="FILE",
-            help="Save the state of the run in FILE, which is removed when the run is done.",
-        ),
-        click.option(
-            "--resume",
-            is_flag=True,
-            help="Continue from the checkpoint, to the same file as without a stop; without one, start.",
-        ),
-        click.option(
-            "--checkpoint-every",
-            default="30s",
-            show_default=True,
-            metavar="TIME",
-            help="How often the state is kept.",
-        ),
-    ]
-    return decorated(function, options)
+checkpoint_options = together(
+    click.option(
+        "--checkpoint",
+        type=FILE,
+        metavar="FILE",
+        help="Save the state of the run in FILE, which is removed when the run is done.",
+    ),
+    click.option(
+        "--resume",
+        is_flag=True,
+        help="Continue from the checkpoint, to the same file as without a stop; without one, start.",
+    ),
+    click.option(
+        "--checkpoint-every",
+        default="30s",
+        show_default=True,
+        metavar="TIME",
+        help="How often the state is kept.",
+    ),
+)
 
 
-def verbosity_options(function: Function) -> Function:
-    """Add ``-v`` and ``-q``."""
+def _set_verbosity(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
+    if value:
+        set_verbosity(quiet=parameter.name == "quiet")
+    return value
 
-    def follow(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
-        if value:
-            set_verbosity(quiet=parameter.name == "quiet")
-        return value
 
-    options = [
-        click.option("-v", "--verbose", count=True, callback=follow, help="Print more, on stderr."),
-        click.option("-q", "--quiet", is_flag=True, callback=follow, help="Print errors only."),
-    ]
-    return decorated(function, options)
+verbosity_options = together(
+    click.option("-v", "--verbose", count=True, callback=_set_verbosity, help="Print more, on stderr."),
+    click.option("-q", "--quiet", is_flag=True, callback=_set_verbosity, help="Print errors only."),
+)
+
+run_options = together(
+    click.option(
+        "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
+    ),
+    threads_option,
+    verbosity_options,
+)
+"""Options that do not change the result."""
 
 
 class Numbers(click.ParamType):
@@ -135,32 +141,12 @@ def flag(option: Option, *, several: bool = False) -> Callable[[Function], Funct
     return click.option(name, type=kind, metavar=option.metavar or None, help=words)
 
 
-def quality_options(function: Function, *, several: bool = False) -> Function:
-    """Add the options that decide the result; ``several``: see ``flag``."""
-    return decorated(function, (flag(option, several=several) for option in OPTIONS))
+def quality_options(*, several: bool = False, refine: bool = False) -> Callable[[Function], Function]:
+    """Return a decorator that adds the options that decide the result, or those of them that ``refine`` has.
 
-
-def refine_options(function: Function) -> Function:
-    """Add those of them that ``refine`` has."""
-    return decorated(function, (flag(option) for option in OPTIONS if option.refine))
-
-
-several_quality_options = functools.partial(quality_options, several=True)
-
-
-def run_options(function: Function) -> Function:
-    """Add the options that do not change the result."""
-    options = [
-        click.option(
-            "--device",
-            default="auto",
-            show_default=True,
-            help="auto (a GPU if there is one), cpu, or cuda:N.",
-        ),
-        threads_option,
-        verbosity_options,
-    ]
-    return decorated(function, options)
+    ``several``: see ``flag``.
+    """
+    return together(*(flag(option, several=several) for option in OPTIONS if option.refine or not refine))
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     FILE,
     Request,
     checkpoint_options,
     overwrite_option,
-    refine_options,
+    quality_options,
     run_options,
 )
 from warpsplat.errors import UsageError
@@ -45,7 +43,7 @@ from warpsplat.fit.settings import make_settings
 @click.option(
     "--max-memory", metavar="SIZE", help="Memory limit, such as 4GB; an image that needs more is refused."
 )
-@refine_options
+@quality_options(refine=True)
 @click.option(
     "--keep",
     is_flag=True,
@@ -77,18 +75,13 @@ def command(
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_exceptions, leave, progress_bar, summary
-    from warpsplat.cli.signals import Interrupt
+    from warpsplat.cli.run import echo_exceptions, finish, watched
     from warpsplat.run.refine import refine
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
     shown = read_input(image) if hooks.need_image() else image
-    interrupt = Interrupt()
-    with (
-        interrupt.watching(),
-        progress_bar(svg, settings, quiet=request.quiet, verbose=request.verbose) as report,
-    ):
+    with watched(request, svg) as (report, stop):
         result = refine(
             data,
             shown,
@@ -98,7 +91,7 @@ def command(
             device=request.device,
             threads=request.threads,
             callback=hooks.watch(report),
-            stop=interrupt,
+            stop=stop,
             name=input_name(svg),
             checkpoint=checkpoint,
             resume=resume,
@@ -112,12 +105,8 @@ def command(
     values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
-    if request.as_json:
-        echo(json.dumps({**values, **hooks.as_dict()}), err=output == STANDARD)
-    elif not request.quiet:
-        echo(f"{summary(output, values)} (before: {before:.2f} dB)", err=output == STANDARD)
     from warpsplat.run.command_line import refine_command
 
     line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
-    hooks.finish(Done(request, shown, [(output, result)], line))
-    leave(result)
+    done = Done(request, shown, [(output, result)], line)
+    finish(done, hooks, values, note=f" (before: {before:.2f} dB)", aside=output == STANDARD)

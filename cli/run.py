@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import sys
 import time
@@ -13,6 +14,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.options import Request
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import ExitCode, printable
@@ -51,9 +53,7 @@ class Bar:
 
 
 @contextlib.contextmanager
-def progress_bar(
-    source: Path, settings: Settings, *, quiet: bool, verbose: int
-) -> Iterator[Callable[[Progress], None]]:
+def progress_bar(source: Path, *, quiet: bool, verbose: int) -> Iterator[Callable[[Progress], None]]:
     """Yield a callback that shows progress: a bar if stderr is a terminal, else lines with ``-vv``."""
     if not sys.stderr.isatty() or quiet:
 
@@ -65,37 +65,42 @@ def progress_bar(
 
         yield echo_step
         return
-    bar: Any
-    state = Bar()
-
-    with click.progressbar(
+    bar: Any = click.progressbar(
         length=BAR_LENGTH,
         label=printable(source.name),
         file=sys.stderr,
         item_show_func=lambda text: text,
         show_eta=False,  # it would count the time that kernels took to compile
-    ) as bar:
+    )
+    state = Bar()
 
-        def show(progress: Progress) -> None:
-            text = state.update(progress, time.monotonic())
-            bar.update(round(BAR_LENGTH * progress.work) - bar.pos, text)
+    def show(progress: Progress) -> None:
+        text = state.update(progress, time.monotonic())
+        bar.update(round(BAR_LENGTH * progress.work) - bar.pos, text)
 
+    with bar:
         yield show
 
 
 @contextlib.contextmanager
-def watched(request: Request, settings: Settings) -> Iterator[tuple[Callable[[Progress], None], Interrupt]]:
-    """Yield the progress callback of a run on the image of ``request``, and its stop callback, Ctrl-C.
+def watched(
+    request: Request, source: Path, shapes: str = ""
+) -> Iterator[tuple[Callable[[Progress], None], Interrupt]]:
+    """Yield the progress callback of a run on the file ``source``, and its stop callback, Ctrl-C.
+
+    With ``-v``, print first which ``shapes`` are about to be made, if given, and on which device.
 
     Raises:
         UsageError: an unknown device is found before a bar is shown.
     """
     start_warp()
-    choose_device(request.device)
+    device = choose_device(request.device)
+    if shapes and request.verbose:
+        echo(f"{source}: {shapes} on {device}", err=True)
     interrupt = Interrupt()
-    bar = progress_bar(request.image, settings, quiet=request.quiet, verbose=request.verbose)
-    with interrupt.watching(), bar as report:
-        yield report, interrupt
+    bar = progress_bar(source, quiet=request.quiet, verbose=request.verbose)
+    with interrupt.watching(), bar as on_progress:
+        yield on_progress, interrupt
 
 
 def requested(settings: Settings) -> str:
@@ -105,13 +110,6 @@ def requested(settings: Settings) -> str:
     if settings.simplify and has_goal:
         number = "no more than needed"
     return f"{number} {'fills and strokes' if settings.mixed else PLURALS[settings.kind]}"
-
-
-def echo_start(request: Request, shapes: str) -> None:
-    """With ``-v``, print which shapes are about to be made, and on which device."""
-    if request.verbose:
-        start_warp()
-        echo(f"{request.image}: {shapes} on {choose_device(request.device)}", err=True)
 
 
 def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
@@ -129,17 +127,24 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
 
 def echo_exceptions(name: str, result: Result) -> None:
     """Print which elements were kept, how the image was reduced, and how many shapes were reset, if any."""
-    if result.kept:
-        echo(f"warpsplat: {name}: kept as it is: {result.kept}", err=True)
-    if result.reduced:
-        echo(f"warpsplat: {name}: {result.reduced}", err=True)
-    if result.renewed:
-        found = f"shapes had numbers that are not finite, {result.renewed} times; these were reset"
-        echo(f"warpsplat: {name}: {found}", err=True)
+    reset = f"shapes had numbers that are not finite, {result.renewed} times; these were reset"
+    notes = (result.kept and f"kept as it is: {result.kept}", result.reduced, result.renewed and reset)
+    for note in filter(None, notes):
+        echo(f"warpsplat: {name}: {note}", err=True)
 
 
-def leave(result: Result) -> None:
-    """Print missed goals, and end the program with the exit code for them, if there are any."""
+def finish(done: Done, hooks: Hooks, values: dict[str, Any], *, note: str = "", aside: bool) -> None:
+    """Print the figures ``values`` of a file, on stderr if ``aside``, and missed goals; have hooks finish.
+
+    Ends the program with the exit code for missed goals, if there are any.
+    """
+    ((output, result),) = done.made
+    assert isinstance(result, Result)
+    if done.request.as_json:
+        echo(json.dumps({**values, **hooks.as_dict()}), err=aside)
+    elif not done.request.quiet:
+        echo(summary(output, values) + note, err=aside)
+    hooks.finish(done)
     for goal in result.missed:
         echo(f"warpsplat: goal missed: {goal}", err=True)
     if result.missed:
@@ -156,21 +161,26 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     if values["paths"] is None:
         size = f"{values['bytes'] / 1000:.1f} kB{picture}"
         return f"{name}: figures not measured, {size}, {values['seconds']:.1f} s{note}"
-    ssim = "" if values["ssim"] is None else f", SSIM {values['ssim']:.3f}"
-    ssim += "" if values["ms_ssim"] is None else f", MS-SSIM {values['ms_ssim']:.3f}"
-    ssim += "" if values["ssimulacra2"] is None else f", SSIMULACRA2 {values['ssimulacra2']:.1f}"
-    psnr = "exact" if values["psnr"] is None else f"{values['psnr']:.2f} dB"
+    similar = "".join(
+        f", {name} {values[key]:.{digits}f}"
+        for name, key, digits in (
+            ("SSIM", "ssim", 3),
+            ("MS-SSIM", "ms_ssim", 3),
+            ("SSIMULACRA2", "ssimulacra2", 1),
+        )
+        if values[key] is not None
+    )
+    psnr = _decibels(values["psnr"])
     if load_renderer(values["renderer"]).soft:
         psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
-    levels = ", ".join(_level(level) for level in values["levels"][:-1])
+    levels = ", ".join(f"{each['shapes']} shapes {_decibels(each['psnr'])}" for each in values["levels"][:-1])
     note += f"; the first {levels}" if levels else ""
     return (
-        f"{name}: {psnr}{ssim}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{name}: {psnr}{similar}, {values['paths']} paths, {values['nodes']} nodes, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped){picture}, "
         f"{values['seconds']:.1f} s{note}"
     )
 
 
-def _level(level: dict[str, Any]) -> str:
-    """Return the PSNR of a layered file up to a level."""
-    return f"{level['shapes']} shapes " + ("exact" if level["psnr"] is None else f"{level['psnr']:.2f} dB")
+def _decibels(psnr: float | None) -> str:
+    return "exact" if psnr is None else f"{psnr:.2f} dB"

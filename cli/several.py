@@ -11,7 +11,7 @@ from typing import Any
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.options import Request
-from warpsplat.cli.run import PLURALS, echo_notes, echo_start, watched
+from warpsplat.cli.run import PLURALS, echo_notes, watched
 from warpsplat.errors import UsageError, printable
 from warpsplat.files.inputs import STANDARD, read_input
 from warpsplat.files.output import check_output
@@ -23,16 +23,19 @@ from warpsplat.run.options import settings_from
 from warpsplat.run.result import Result
 from warpsplat.run.several import check_several, vectorize_several
 
-COLUMNS = ("shapes", "dB", "SSIM", "kB", "gzip kB", "seconds")
-"""Columns of the table."""
+COLUMNS = (
+    ("shapes", "shapes", 0, 1),
+    ("dB", "psnr", 2, 1),
+    ("SSIM", "ssim", 3, 1),
+    ("kB", "bytes", 1, 1e-3),
+    ("gzip kB", "gzip_bytes", 1, 1e-3),
+    ("seconds", "seconds", 1, 1),
+)
+"""Columns of the table: heading, name in ``Result.as_dict``, decimal places, factor."""
 
 
 def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any], hooks: Hooks) -> None:
-    """Make a file for each number of shapes, and print their figures.
-
-    Raises:
-        WarpsplatError: what cannot be done; found before the run, as far as possible.
-    """
+    """Make a file for each number of shapes, and print their figures."""
     inputs, image = request.inputs, request.image
     settings = settings_from({**given, "curves": max(numbers)})
     check_several(settings, numbers)
@@ -43,8 +46,8 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
         if path.parent.exists():
             check_output(path, *inputs, endings=ENDINGS, overwrite=request.overwrite)
     hooks.check(inputs, outputs, overwrite=request.overwrite)
-    echo_start(request, f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}")
-    with watched(request, settings) as (report, stop):
+    shapes = f"{', '.join(map(str, numbers))} {PLURALS[settings.kind]}"
+    with watched(request, image, shapes) as (report, stop):
         results = vectorize_several(
             data, numbers, settings=settings, outputs=outputs, callback=report, stop=stop, **request.source
         )
@@ -53,16 +56,16 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     made = list(zip(paths, results, strict=True))
     if not request.quiet and results:
         echo_notes(image, settings, results[-1], verbose=request.verbose)
+    left = ", ".join(str(number) for number in numbers if number not in begun)
+    missing = f"interrupted: no file with {left} shapes" if left else ""
     if request.as_json:
-        each = [
-            {"image": str(image), "output": str(path), "device": request.device, **result.as_dict()}
-            for path, result in made
-        ]
+        device = request.device
+        each = [{"image": str(image), "output": str(p), "device": device, **r.as_dict()} for p, r in made]
         echo(json.dumps(each))
-        for line in _missing(numbers, begun):
-            echo(f"warpsplat: {line}", err=True)
+        if missing:
+            echo(f"warpsplat: {missing}", err=True)
     elif not request.quiet:
-        echo("\n".join([table(made), *_missing(numbers, begun)] if made else _missing(numbers, begun)))
+        echo("\n".join(filter(None, [table(made) if made else "", missing])))
     line = several_command(settings, numbers, str(image), request.output, *request.flags)
     hooks.finish(Done(request, data, made, line, several=True))
 
@@ -100,36 +103,15 @@ def _literal(text: str) -> str:
     return text.replace("{", "{{").replace("}", "}}")
 
 
-def _missing(numbers: Sequence[int], begun: Sequence[int]) -> list[str]:
-    """Return a line about the ``numbers`` without a file, if there are any."""
-    left = [str(number) for number in numbers if number not in begun]
-    return [f"interrupted: no file with {', '.join(left)} shapes"] if left else []
-
-
 def table(made: Sequence[tuple[Path, Result]]) -> str:
     """Return a table of results."""
-    rows = [("", *COLUMNS), *((printable(str(path)), *_figures(result)) for path, result in made)]
+    rows = [["", *(heading for heading, *_ in COLUMNS)]]
+    for path, result in made:
+        values = result.as_dict()
+        rows.append([printable(str(path))])
+        for _, name, digits, factor in COLUMNS:
+            missing = "exact" if name == "psnr" and values["paths"] is not None else "-"
+            rows[-1].append(missing if values[name] is None else f"{factor * values[name]:.{digits}f}")
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for first, *others in rows:
-        cells = (text.rjust(width) for text, width in zip(others, widths[1:], strict=True))
-        lines.append("  ".join([first.ljust(widths[0]), *cells]))
-    stopped = [path for path, result in made if result.stopped]
-    return "\n".join(lines + [f"{path}: stopped, not finished" for path in stopped])
-
-
-def _figures(result: Result) -> tuple[str, ...]:
-    values = result.as_dict()
-
-    def shown(name: str, digits: int, factor: float = 1.0, missing: str = "-") -> str:
-        value = values[name]
-        return missing if value is None else f"{factor * value:.{digits}f}"
-
-    return (
-        str(values["shapes"]),
-        shown("psnr", 2, missing="-" if values["paths"] is None else "exact"),
-        shown("ssim", 3),
-        shown("bytes", 1, 1e-3),
-        shown("gzip_bytes", 1, 1e-3),
-        shown("seconds", 1),
-    )
+    lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows]
+    return "\n".join(lines + [f"{path}: stopped, not finished" for path, result in made if result.stopped])

@@ -14,36 +14,40 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from typing import Any
-
-STOPPING = (signal.SIGINT, signal.SIGTERM)
-
+from typing import Any, ClassVar
 
 SHOW_CURSOR = b"\x1b[?25h"
 """A progress bar hides the cursor and gets no chance to show it again."""
 
 
-class _State:
-    """State of the process's handlers."""
+class Interrupt:
+    """Tells a run whether to stop; polled between steps as ``stop`` of the library."""
 
-    received: int | None = None
-    patient = False
-    """Whether a run polls ``Interrupt``, so that the first signal need not raise."""
+    received: ClassVar[int | None] = None
+    """The number of the first signal since ``handled`` began."""
+    polled: ClassVar[bool] = False
+    """Whether a run polls this, so that the first signal need not raise."""
 
+    def __call__(self) -> bool:
+        """Return whether a signal came. After the first call, signals no longer raise."""
+        Interrupt.polled = True
+        return Interrupt.received is not None
 
-_state = _State()
-
-
-def received() -> int | None:
-    """Return the number of the first signal since ``handled`` began."""
-    return _state.received
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Watch one run: signals no longer raise from its first call to the end of the block."""
+        Interrupt.polled = False
+        try:
+            yield
+        finally:
+            Interrupt.polled = False
 
 
 def _handle(number: int, frame: Any) -> None:
-    if _state.received is not None:
+    if Interrupt.received is not None:
         _end(number)
-    _state.received = number
-    if not _state.patient:
+    Interrupt.received = number
+    if not Interrupt.polled:
         raise KeyboardInterrupt
 
 
@@ -71,7 +75,7 @@ def leave_compiler(code: int) -> None:
 @contextlib.contextmanager
 def handled() -> Iterator[None]:
     """Handle SIGINT and SIGTERM in the block, unless they are ignored or this is not the main thread."""
-    _state.received, _state.patient = None, False
+    Interrupt.received, Interrupt.polled = None, False
     before: dict[int, Any] = {}
     hook = sys.unraisablehook
 
@@ -82,7 +86,7 @@ def handled() -> Iterator[None]:
     sys.unraisablehook = unraisable
     try:
         with contextlib.suppress(ValueError):
-            for number in STOPPING:
+            for number in (signal.SIGINT, signal.SIGTERM):
                 if signal.getsignal(number) is not signal.SIG_IGN:
                     before[number] = signal.signal(number, _handle)
         yield
@@ -90,21 +94,3 @@ def handled() -> Iterator[None]:
         for caught, handler in before.items():
             signal.signal(caught, handler)
         sys.unraisablehook = hook
-
-
-class Interrupt:
-    """Tells a run whether to stop; polled between steps as ``stop`` of the library."""
-
-    def __call__(self) -> bool:
-        """Return whether a signal came. After the first call, signals no longer raise."""
-        _state.patient = True
-        return _state.received is not None
-
-    @contextlib.contextmanager
-    def watching(self) -> Iterator[None]:
-        """Watch one run: signals no longer raise from its first call to the end of the block."""
-        _state.patient = False
-        try:
-            yield
-        finally:
-            _state.patient = False

@@ -31,12 +31,7 @@ TWICE = 1.9
 
 
 def suggest_number(request: Request, given: dict[str, Any]) -> None:
-    """Print a suggestion, its reasons, and the command that follows it.
-
-    Raises:
-        UsageError: settings that fix the number of shapes, or an output.
-        Abort: interrupted.
-    """
+    """Print a suggestion, its reasons, and the command that follows it."""
     if request.output:
         raise UsageError(NOTHING_ELSE)
     if given["curves"] is not None:
@@ -47,11 +42,11 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     from warpsplat.run.options import settings_from
     from warpsplat.run.suggest import check_suggesting, suggest
 
-    image, _ = request.image, request.inputs
+    image = request.inputs[0]
     settings = settings_from(given)
     check_suggesting(settings)
     data = read_input(image)
-    with watched(request, settings) as (report, stop):
+    with watched(request, image) as (report, stop):
         made = suggest(data, settings=settings, callback=report, stop=stop, **request.source)
     if made is None:
         raise click.Abort  # prints "interrupted"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,8 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
+    quality_options,
     run_options,
-    several_quality_options,
 )
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.errors import UsageError
@@ -35,7 +34,7 @@ from warpsplat.run.options import settings_from
     " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@several_quality_options
+@quality_options(several=True)
 @importance_option
 @checkpoint_options
 @hook_options("vectorize")
@@ -78,7 +77,7 @@ def command(
         hooks.check_mode("several images")
         if as_uri:
             raise UsageError("--data-uri takes one image")
-        vectorize_images = dict(declared("provides")).get("vectorize_images")
+        vectorize_images = declared("provides").get("vectorize_images")
         if vectorize_images is None:
             raise UsageError("several images need the extension batch, which is not installed")
         load(vectorize_images)(images, request, given, hooks.values)
@@ -101,9 +100,6 @@ def single(
     """Make a file of one image, and whatever hooks add.
 
     ``keeping``: the arguments of ``warpsplat.vectorize`` for checkpoints.
-
-    Raises:
-        WarpsplatError: what cannot be done; found before the run, as far as possible.
     """
     from warpsplat.files.inputs import STANDARD, read_input
 
@@ -115,12 +111,11 @@ def single(
     inputs, data = request.inputs, read_input(image)
     output = request.output or Path(image.name).with_suffix(".svg")
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_notes, echo_start, leave, requested, summary, watched
+    from warpsplat.cli.run import echo_notes, finish, requested, watched
     from warpsplat.run.command_line import vectorize_command
     from warpsplat.run.vectorize import vectorize
 
-    echo_start(request, requested(settings))
-    with watched(request, settings) as (report, stop):
+    with watched(request, image, requested(settings)) as (report, stop):
         result = vectorize(
             data,
             settings=settings,
@@ -139,11 +134,6 @@ def single(
 
         echo(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), "device": request.device, **result.as_dict()}
-    aside = as_uri or output == STANDARD
-    if request.as_json:
-        echo(json.dumps({**values, **hooks.as_dict()}), err=aside)
-    elif not request.quiet:
-        echo(summary(output, values), err=aside)
     line = vectorize_command(settings, str(image), str(output), *request.flags)
-    hooks.finish(Done(request, data, [(output, result)], line))
-    leave(result)
+    done = Done(request, data, [(output, result)], line)
+    finish(done, hooks, values, aside=as_uri or output == STANDARD)

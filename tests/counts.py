@@ -13,8 +13,6 @@ from pathlib import Path
 
 from tests import ROOT
 
-EXTENSIONS = ("paper", "torch", "pydiffvg", "batch", "pages", "motion", "tools")
-
 LONG_LINES, MANY_PARAMETERS = 60, 8
 
 PROBE = """
@@ -44,10 +42,11 @@ def line_count(paths: Iterable[Path]) -> int:
     return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
 
 
-def extension_of(path: Path, root: Path) -> str | None:
-    """Return the extension that a file belongs to; None for the core."""
-    parts = path.relative_to(root).parts
-    return parts[1] if parts[0] == "warpsplat" and parts[1] in EXTENSIONS else None
+def part_of(path: Path, root: Path) -> str:
+    """Return the extension that a file belongs to, or "core"; by our extensions in a checkout without any."""
+    package, folder = path.relative_to(root).parts[:2]
+    declared = [*root.glob("warpsplat/*/extension.py")] or ROOT.glob("warpsplat/*/extension.py")
+    return folder if package == "warpsplat" and folder in {one.parent.name for one in declared} else "core"
 
 
 def parameters(function: Function) -> list[str]:
@@ -82,7 +81,7 @@ def count(root: Path) -> dict[str, object]:
     product = list(python_files(root, "warpsplat", "kernels", "cli"))
     by_part = defaultdict(list)
     for path in product:
-        by_part[extension_of(path, root) or "core"].append(path)
+        by_part[part_of(path, root)].append(path)
     pages = [p for p in (root / "warpsplat").rglob("*") if p.suffix in {".js", ".css", ".j2"}]
     trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in product}
     functions = [

@@ -20,7 +20,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tests import ROOT
 
@@ -63,6 +63,24 @@ class Task:
     """Largest file [bytes], as ``ulimit -f`` sets it; 0: any."""
     rights: bool = True
     """False: a superuser, whom permissions do not bind, becomes another user."""
+    stdin: str = os.devnull
+    memory: int = 0
+    """Most memory that it can allocate [bytes]; 0: any."""
+    patience: int = 0
+    """Seconds after which SIGALRM ends it; 0: never."""
+
+
+class Outcome(NamedTuple):
+    """The outcome of a command."""
+
+    code: int
+    """Exit code; minus the signal's number if a signal ended the process."""
+    stdout: str = ""
+    stderr: str = ""
+    seconds: float = 0.0
+    """Processor time [s]."""
+    peak: int = 0
+    """Most memory that the process used [bytes]."""
 
 
 class _ImportTrap(importlib.abc.MetaPathFinder):
@@ -108,13 +126,16 @@ def _set_trap(task: Task) -> None:
 def run(task: Task) -> None:
     """Run a task in this process, which cannot be used for anything else afterwards."""
     os.chdir(task.folder)
-    for number, stream in ((1, "stdout"), (2, "stderr")):
+    for number, stream in enumerate(("stdin", "stdout", "stderr")):
         name = getattr(task, stream)
         if name == CLOSED:
             os.close(number)
             setattr(sys, stream, None)  # as Python finds it at its start
-        else:
-            os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+            continue
+        opened = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC if number else os.O_RDONLY)
+        os.dup2(opened, number)
+        if opened != number:
+            os.close(opened)
     if task.ignored:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     if task.moment:
@@ -122,6 +143,9 @@ def run(task: Task) -> None:
     if task.file_size:
         sys.dont_write_bytecode = True  # Python itself would leave half a file in the cache of a module
         resource.setrlimit(resource.RLIMIT_FSIZE, (task.file_size, task.file_size))
+    if task.memory:
+        resource.setrlimit(resource.RLIMIT_AS, (task.memory, task.memory))
+    signal.alarm(task.patience)
     if not task.rights and os.geteuid() == 0:
         os.setgroups([])
         os.setgid(NOBODY)
@@ -147,7 +171,7 @@ def _end(task: Task) -> None:
 
 
 def serve() -> None:
-    """Fork for each task on the standard input, and answer with its exit code."""
+    """Fork for each task on the standard input; answer with its exit code, processor time and memory."""
     from warpsplat.cli.main import main
 
     sys.meta_path.insert(0, _ImportTrap("torch", _refuse))
@@ -159,13 +183,15 @@ def serve() -> None:
             os.chdir(task.folder)
             with contextlib.suppress(SystemExit):
                 main(task.arguments)
-            code = 0
+            answer: tuple[float, ...] = (0, 0.0, 0)
         else:
             child = os.fork()
             if not child:
                 _end(task)
-            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        print(code, file=answers, flush=True)
+            _, status, used = os.wait4(child, 0)
+            code = os.waitstatus_to_exitcode(status)
+            answer = code, used.ru_utime + used.ru_stime, 1024 * used.ru_maxrss
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 def make_image(path: Path, seed: int = 0) -> None:
@@ -213,18 +239,23 @@ class Forks:
 
     def run(self, arguments: Sequence[str], folder: Path, **how: Any) -> tuple[int, str, str]:
         """Return exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
+        return self.outcome(arguments, folder, **how)[:3]
+
+    def outcome(self, arguments: Sequence[str], folder: Path, **how: Any) -> Outcome:
+        """Return all that is known of a run; ``how``: see ``Task``."""
         task = Task(list(arguments), str(folder), **{"stdout": self.out, "stderr": self.err, **how})
-        code = self._ask(task)
+        code, seconds, peak = self._ask(task)
         out, err = (
-            "" if n == CLOSED or n.startswith("/dev/") else Path(n).read_text()
+            "" if n == CLOSED or n.startswith("/dev/") else Path(n).read_text("utf-8", "replace")
             for n in (task.stdout, task.stderr)
         )
-        return code, out, err
+        return Outcome(code, out, err, seconds, peak)
 
-    def _ask(self, task: Task) -> int:
+    def _ask(self, task: Task) -> tuple[int, float, int]:
         assert self.process.stdin and self.process.stdout
         print(json.dumps(asdict(task)), file=self.process.stdin, flush=True)
-        return int(self.process.stdout.readline())
+        code, seconds, peak = json.loads(self.process.stdout.readline())
+        return code, seconds, peak
 
 
 if __name__ == "__main__":

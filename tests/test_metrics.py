@@ -14,7 +14,7 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import Stopped
-from warpsplat.metrics import SSIMULACRA2_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
+from warpsplat.metrics import SSIMULACRA2_PIXELS, psnr, score_svg, similarities, ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg import viewer
 from warpsplat.svg.viewer import on_white, render_svg
@@ -31,24 +31,24 @@ def test_psnr() -> None:
 def test_ssim() -> None:
     rng = np.random.default_rng(0)
     a = rng.uniform(0, 255, (32, 32, 3))
-    same = ssim(a, a)
-    noisy = ssim(a, np.clip(a + rng.normal(0, 60, a.shape), 0, 255))
+    same = similarities(a, a)[0]
+    noisy = similarities(a, np.clip(a + rng.normal(0, 60, a.shape), 0, 255))[0]
     assert same == pytest.approx(1)
     assert noisy is not None
     assert 0.2 < noisy < 0.95
-    assert ssim(a[:11], a[:11]) is None
+    assert similarities(a[:11], a[:11])[0] is None
 
 
 def test_ms_ssim() -> None:
     rng = np.random.default_rng(0)
     a = rng.uniform(0, 255, (352, 360, 3))
-    assert ms_ssim(a, a) == pytest.approx(1)
+    assert similarities(a, a)[1] == pytest.approx(1)
     blurred = cv2.GaussianBlur(a, (0, 0), 1.0)
-    fine, coarse = ms_ssim(a, blurred), ms_ssim(a, np.clip(a + 40, 0, 255))
+    fine, coarse = similarities(a, blurred)[1], similarities(a, np.clip(a + 40, 0, 255))[1]
     assert fine is not None
     assert coarse is not None
     assert 0.3 < fine < coarse < 1
-    assert ms_ssim(a[:351], a[:351]) is None, "the fifth scale would have 21 rows"
+    assert similarities(a[:351], a[:351])[1] is None, "the fifth scale would have 21 rows"
 
 
 def test_white_behind_transparency() -> None:

@@ -60,7 +60,7 @@ _HOMES = {
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",
     **dict.fromkeys(("Expected", "Suggestion"), "warpsplat.run.suggest"),
-    **dict(declared("api")),
+    **declared("api"),
 }
 """Where each name comes from, those of extensions included. They are imported when they are asked for: the
 command line starts light."""

@@ -88,9 +88,6 @@ NO_MEMORY = (
 
 NO_RESOURCES = {errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE}
 
-SHOWN = 80
-"""Most characters of a refused value in a message."""
-
 
 def shown(value: object) -> str:
     """Return the ``repr`` of a refused value, shortened for a message."""
@@ -101,7 +98,7 @@ def shown(value: object) -> str:
     return cut(words)
 
 
-def cut(text: str, most: int = SHOWN) -> str:
+def cut(text: str, most: int = 80) -> str:
     """Return a text, shortened to ``most`` characters."""
     return text if len(text) <= most else f"{text[:most]} ..."
 

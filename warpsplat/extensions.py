@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.util
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,10 +67,9 @@ def extensions() -> dict[str, Extension]:
     return found
 
 
-def declared(kind: str) -> Iterator[tuple[str, Any]]:
-    """Yield all (name, value) of a mapping of ``Extension``, such as "commands"."""
-    for extension in extensions().values():
-        yield from getattr(extension, kind).items()
+def declared(kind: str) -> dict[str, Any]:
+    """Return a mapping of ``Extension``, such as "commands", joined over all extensions."""
+    return {name: value for one in extensions().values() for name, value in getattr(one, kind).items()}
 
 
 def load(target: str) -> Any:
@@ -81,7 +80,7 @@ def load(target: str) -> Any:
 
 def renderer_names() -> tuple[str, ...]:
     """Return the names of all renderers, the core's first."""
-    return ("exact", *(name for name, _ in declared("renderers")))
+    return ("exact", *declared("renderers"))
 
 
 def load_renderer(name: str) -> Any:
@@ -92,4 +91,4 @@ def load_renderer(name: str) -> Any:
     """
     if name not in renderer_names():
         raise UsageError(f"renderer must be one of {', '.join(renderer_names())}, not {shown(name)}")
-    return load({"exact": "warpsplat.fit.renderers:EXACT", **dict(declared("renderers"))}[name])
+    return load({"exact": "warpsplat.fit.renderers:EXACT", **declared("renderers")}[name])

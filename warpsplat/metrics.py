@@ -71,26 +71,15 @@ def decibels(error: float) -> float:
     return float("inf") if error == 0 else float(10 * elementary.log10(65025 / error))
 
 
-def ssim(a: Floats, b: Floats) -> float | None:
-    """Return structural similarity (Wang et al. 2004): Gaussian window of 11x11, sigma 1.5, mean over
-    channels.
+def similarities(a: Floats, b: Floats) -> tuple[float | None, float | None]:
+    """Return SSIM and MS-SSIM of images (height, width, channel) in [0, 255].
 
-    None: the image is smaller than the window.
+    Structural similarity (Wang et al. 2004) with a Gaussian window of 11x11, sigma 1.5, mean over channels;
+    that of several scales (Wang et al. 2003), halved by area. None: the smallest scale is smaller than the
+    window.
     """
-    return _figures(_planes(a, b))[1]
-
-
-def ms_ssim(a: Floats, b: Floats) -> float | None:
-    """Return multi-scale structural similarity (Wang et al. 2003); scales are halved by area.
-
-    None: the smallest scale is smaller than the window.
-    """
-    return _figures(_planes(a, b))[2]
-
-
-def _planes(a: Floats, b: Floats) -> Iterator[Pair]:
-    for channel in range(a.shape[2]):
-        yield Pair.of(*(np.ascontiguousarray(x[..., channel], np.float32) for x in (a, b)))
+    planes = ([np.ascontiguousarray(x[..., i], np.float32) for x in (a, b)] for i in range(a.shape[2]))
+    return _figures(Pair.of(*plane) for plane in planes)[1:]
 
 
 def _figures(pairs: Iterable[Pair], stop: Stop | None = None) -> tuple[float, float | None, float | None]:
@@ -254,10 +243,9 @@ def score_svg(
     """
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
-    papers = (255,) if target.shape[2] == 3 else (0, 255)
-    paper = papers[0]
-    if len(papers) > 1:
-        paper = min(papers, key=lambda level: decibels(_error(shown, target, level)))
+    paper = 255
+    if target.shape[2] == 4:
+        paper = max((0, 255), key=lambda level: _error(shown, target, level))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check_stop(stop)
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None

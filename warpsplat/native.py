@@ -1,4 +1,4 @@
-"""Below Python: what native code prints behind its back, the memory it keeps; memory, and cores."""
+"""The system below Python: messages of native code, memory, cores."""
 
 from __future__ import annotations
 
@@ -11,22 +11,40 @@ from pathlib import Path
 
 _lock = threading.Lock()
 _hiding = 0
-"""Threads that have something to hide."""
+"""Threads that hide messages."""
 _saved = -1
-"""The process's standard error, meanwhile."""
+"""A copy of the process's standard error, meanwhile."""
 
 
 @contextlib.contextmanager
 def messages_hidden() -> Iterator[None]:
-    """Send the process's standard error to nowhere: native code writes there behind Python's back.
+    """Discard what goes to the process's standard error: native code writes there behind Python's back.
 
     It comes back when the last of all threads that ask for this is done.
     """
-    _hide()
+    global _hiding, _saved  # noqa: PLW0603 - a process has one standard error
+    with _lock:
+        if not _hiding:
+            with contextlib.suppress(OSError):  # else it is shown
+                _saved = os.dup(2)
+                discard_output(2)
+        _hiding += 1
     try:
         yield
     finally:
-        _show()
+        with _lock:
+            _hiding -= 1
+            if not _hiding and _saved >= 0:
+                os.dup2(_saved, 2)
+                os.close(_saved)
+                _saved = -1
+
+
+def discard_output(descriptor: int) -> None:
+    """Have all that is written to a file descriptor discarded."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)
 
 
 def write_message(text: str) -> None:
@@ -37,30 +55,6 @@ def write_message(text: str) -> None:
     """
     with _lock:
         os.write(_saved if _hiding and _saved >= 0 else 2, text.encode(errors="backslashreplace"))
-
-
-def _hide() -> None:
-    global _hiding, _saved  # noqa: PLW0603 - a process has one standard error
-    with _lock:
-        if not _hiding:
-            try:
-                _saved = os.dup(2)
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, 2)
-                os.close(nowhere)
-            except OSError:
-                pass  # then they are seen
-        _hiding += 1
-
-
-def _show() -> None:
-    global _hiding, _saved  # noqa: PLW0603
-    with _lock:
-        _hiding -= 1
-        if not _hiding and _saved >= 0:
-            os.dup2(_saved, 2)
-            os.close(_saved)
-            _saved = -1
 
 
 def release_memory() -> None:

@@ -118,12 +118,12 @@ def test_whatever_an_image_throws_is_its_own_failure(
     error: BaseException,
     words: str,
 ) -> None:
-    def load(data: bytes, name: str, *, paper: object, factor: int) -> np.ndarray:
+    def load(data: object, name: str, *, paper: object, factor: int) -> np.ndarray:
         if name.endswith("a.png"):
             raise error
         return np.full((24, 32, 3), 0.5, np.float32)
 
-    monkeypatch.setattr("warpsplat.files.sources.load_image", load)
+    monkeypatch.setattr("warpsplat.run.prepare.image_of", load)
     text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
     assert run("batch", write(folder, text), "--json") == 5
     captured = capsys.readouterr()

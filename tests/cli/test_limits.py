@@ -38,9 +38,8 @@ def assert_one_line(text: str) -> None:
 ROOM = 200
 """Largest file [bytes]: less than any result."""
 
-VECTORIZE = f"vectorize a.png -o a.svg {' '.join(QUICK)}"
 WRITING = {
-    "vectorize": VECTORIZE,
+    "vectorize": f"vectorize a.png -o a.svg {' '.join(QUICK)}",
     "refine": "refine drawing.svg a.png -o a.svg --device cpu --iterations 1",
     "render": "render drawing.svg -o a-large.png --scale 9",
 }
@@ -82,20 +81,3 @@ def test_an_input_without_permission(forks: Forks, folder: Path, name: str) -> N
     assert code == 3, err
     assert_one_line(err)
     assert f"{name}: no permission" in err
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-@pytest.mark.parametrize("command", ["info --json", "eval a.png drawing.svg"])
-def test_a_full_standard_output(forks: Forks, folder: Path, command: str) -> None:
-    code, _, err = forks.run(command.split(), folder, stdout="/dev/full")
-    assert code == 4, err
-    assert_one_line(err)
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-def test_a_full_standard_error(forks: Forks, folder: Path) -> None:
-    """The code is that of the failure, and what was asked for is done."""
-    assert forks.run(["eval", "none.png", "drawing.svg"], folder, stderr="/dev/full")[0] == 3
-    code, out, _ = forks.run([*VECTORIZE.split(), "-v"], folder, stderr="/dev/full")
-    assert code == 0
-    assert out.startswith("a.svg: ")

@@ -6,38 +6,60 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, one_line, run, shell
+from tests.cli.helpers import QUICK, one_line, run
 from tests.forks import CLOSED, Forks
-from warpsplat.cli.main import COMMANDS, json_stream
+from warpsplat.cli.main import COMMANDS, json_stream, report_error
 from warpsplat.errors import CapacityError
 from warpsplat.svg.viewer import render_own
 
 FULL = "/dev/full"
+HEAVY = {"warp", "torch", "cv2", "PIL", "resvg_py"}
 
 
-def test_help_is_quick_and_heavy_libraries_stay_out() -> None:
+COMPLETION = {
+    "_WARPSPLAT_COMPLETE": "bash_complete",
+    "COMP_WORDS": "warpsplat vectorize --qu",
+    "COMP_CWORD": "2",
+}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "heavy", "environment", "words"),
+    [
+        (["--help"], {"numpy", *HEAVY}, {}, COMMANDS),
+        ([], HEAVY, COMPLETION, ("plain,--quality", "plain,--quiet")),
+    ],
+)
+def test_help_is_quick_and_heavy_libraries_stay_out(
+    arguments: list[str], heavy: set[str], environment: dict[str, str], words: Iterable[str]
+) -> None:
+    """So does the completion of an option's name."""
     code = (
-        "import sys; from warpsplat.cli.main import main\n"
-        "try: main(['--help'])\n"
-        "except SystemExit as e: assert not e.code\n"
-        "heavy = {'warp', 'numpy', 'torch', 'cv2', 'PIL'} & set(sys.modules); assert not heavy, heavy"
+        f"import sys; from warpsplat.cli.main import main\ntry: main({arguments})\n"
+        f"except SystemExit as e: assert not e.code\nassert not {heavy} & set(sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
-    for name in COMMANDS:
-        assert name in done.stdout
+    assert all(word in done.stdout for word in words)
     assert "\\b" not in done.stdout
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stdout", "stderr", "code"),
-    [("out", CLOSED, 0), (CLOSED, "err", 0), ("out", FULL, 0), (FULL, "err", 4)],
+    [("out", CLOSED, 0), (CLOSED, "err", 0), (CLOSED, CLOSED, 0), ("out", FULL, 0), (FULL, "err", 4)],
 )
 def test_standard_streams_that_are_full_or_closed(
     forks: Forks, image: Path, stdout: str, stderr: str, code: int
@@ -45,21 +67,19 @@ def test_standard_streams_that_are_full_or_closed(
     if FULL in (stdout, stderr) and not os.path.exists(FULL):
         pytest.skip("a device of Linux")
     output = image.parent / "a.svg"
-    arguments = ["vectorize", str(image), "-o", str(output), "-vv", *QUICK]
     streams = [n if n in (CLOSED, FULL) else str(image.parent / n) for n in (stdout, stderr)]
-    done, out, err = forks.run(arguments, image.parent, stdout=streams[0], stderr=streams[1])
+    how = {"stdout": streams[0], "stderr": streams[1], "stdin": stdout if stdout == stderr else os.devnull}
+    done, out, err = forks.run(
+        ["vectorize", str(image), "-o", str(output), "-vv", *QUICK], image.parent, **how
+    )
     assert done == code
     assert "Traceback" not in err
     assert ("a.svg: " in out) == (stdout == "out")
     render_own(output.read_text())
-
-
-@pytest.mark.slow
-def test_all_standard_streams_are_closed(image: Path) -> None:
-    """Python itself starts without them."""
-    output = image.parent / "a.svg"
-    assert shell("$W <&- >&- 2>&-", "vectorize", image, "-o", output, "-vv", *QUICK).returncode == 0
-    render_own(output.read_text())
+    assert forks.run(["eval", "none.png", str(output)], image.parent, **how)[0] == 3
+    done, _, err = forks.run(["eval", str(image), str(output)], image.parent, **how)
+    assert done == code
+    assert len(err.splitlines()) == (code == 4)
 
 
 @pytest.mark.slow
@@ -91,22 +111,30 @@ RAISED = [
 
 @pytest.mark.parametrize(("error", "code", "words"), RAISED)
 def test_whatever_is_raised_is_one_line_and_a_code(
-    image: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
     error: BaseException,
     code: int,
     words: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise error
-
-    monkeypatch.setattr("warpsplat.run.strategies.fit", fail)
-    assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
+    with pytest.raises(type(error)):
+        raise error  # which gives it a traceback
+    assert report_error(error) == code
     assert words in one_line(capsys.readouterr().err)
     monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")
-    assert run("vectorize", image, "-o", image.parent / "a.svg", *QUICK) == code
+    assert report_error(error) == code
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_reader_that_has_gone(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def write(text: str, *, err: bool) -> None:
+        if not err:
+            raise BrokenPipeError
+        print(text, file=sys.stderr)
+
+    monkeypatch.setattr("warpsplat.cli.echo.click.echo", write)
+    assert run("info") == 4
+    assert "standard output: closed by its reader" in one_line(capsys.readouterr().err)
 
 
 def test_an_image_without_a_command_is_vectorized(
@@ -133,39 +161,13 @@ def test_objects_keep_out_of_the_way_of_a_file(
     assert json_stream(["vectorize", "a", "--json", "--", "-o", "-"]) == "stdout"
 
 
-@pytest.mark.parametrize(
-    ("shell", "words"), [("bash", "plain,--quality"), ("zsh", "--quality"), ("fish", "--quality")]
-)
-def test_completion(
-    shell: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_source")
-    if shell != "bash":  # whose version click asks for
-        assert run() == 0
-        assert "_warpsplat_completion" in capsys.readouterr().out
-    last = "--qual" if shell == "fish" else "2"
-    for name, value in {"COMPLETE": f"{shell}_complete"}.items():
-        monkeypatch.setenv(f"_WARPSPLAT_{name}", value)
-    monkeypatch.setenv("COMP_WORDS", "warpsplat vectorize --qual")
-    monkeypatch.setenv("COMP_CWORD", last)
     assert run() == 0
-    assert words in capsys.readouterr().out
-
-
-def test_completion_imports_nothing_heavy() -> None:
-    code = (
-        "import sys; from warpsplat.cli.main import main\n"
-        "try: main([])\n"
-        "except SystemExit as e: assert not e.code\n"
-        "heavy = {'warp', 'torch', 'cv2', 'PIL', 'resvg_py'} & set(sys.modules); assert not heavy, heavy"
-    )
-    asked = {
-        "_WARPSPLAT_COMPLETE": "bash_complete",
-        "COMP_WORDS": "warpsplat vectorize --qu",
-        "COMP_CWORD": "2",
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | asked, capture_output=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.decode().split() == ["plain,--quality", "plain,--quiet"]
+    assert "_warpsplat_completion" in capsys.readouterr().out
+    monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_complete")
+    monkeypatch.setenv("COMP_WORDS", "warpsplat vectorize --qual")
+    monkeypatch.setenv("COMP_CWORD", "--qual" if shell == "fish" else "2")
+    assert run() == 0
+    assert "--quality" in capsys.readouterr().out

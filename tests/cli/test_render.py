@@ -24,18 +24,6 @@ def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert capsys.readouterr() == ("", "")
 
 
-def test_render_takes_any_svg(tmp_path: Path) -> None:
-    foreign = tmp_path / "a.svg"
-    foreign.write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 5">'
-        '<circle cx="5" cy="2" r="2" fill="red"/></svg>'
-    )
-    assert run("render", foreign, "-o", tmp_path / "a.png", "--scale", "4") == 0
-    picture = Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())).convert("RGBA")
-    assert picture.size == (40, 20)
-    assert picture.getpixel((20, 8)) == (255, 0, 0, 255)
-
-
 SHAPES = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20.4">'
     '<circle cx="10" cy="10" r="8" fill="red" fill-opacity=".5"/>'
@@ -66,25 +54,28 @@ def test_our_own_renderers(renderer: str, least: float, tmp_path: Path) -> None:
         assert psnr(*(np.asarray(p.convert("RGB")).astype(np.float64) for p in shown)) > least
 
 
-@pytest.mark.parametrize("body", ["", '<rect width="30" height="20" fill="red"/>'])
-def test_nothing_but_paper(body: str, tmp_path: Path) -> None:
-    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
-    svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20">{body}</svg>')
-    assert run("render", svg, "-o", png, "--renderer", "exact", "--device", "cpu") == 0
-    with Image.open(png) as picture:
-        expected = (255, 0, 0, 255) if body else (0, 0, 0, 0)
-        assert picture.convert("RGBA").getpixel((15, 10)) == expected
+RECT = '<rect width="30" height="20" fill="red"/>'
 
 
 @pytest.mark.parametrize(
-    ("size", "pixels"), [('width="1in" height="48px"', (96, 48)), ('width="1" height="60000"', (1, 60000))]
+    ("size", "body", "pixels"),
+    [
+        ('width="1in" height="48px"', PATH, (96, 48)),
+        ('width="1" height="60000"', PATH, (1, 60000)),
+        ('width="30" height="20"', RECT, (30, 20)),
+        ('width="30" height="20"', "", (30, 20)),
+    ],
 )
-def test_sizes(tmp_path: Path, size: str, pixels: tuple[int, int]) -> None:
-    svg = tmp_path / "a.svg"
-    svg.write_text(f"{HEAD}{size}>{PATH}</svg>")
-    assert run("render", svg, "-o", tmp_path / "a.png") == 0
-    with Image.open(tmp_path / "a.png") as picture:
-        assert picture.size == pixels
+def test_any_svg(tmp_path: Path, size: str, body: str, pixels: tuple[int, int]) -> None:
+    svg, png = tmp_path / "a.svg", tmp_path / "a.png"
+    svg.write_text(f"{HEAD}{size}>{body}</svg>")
+    for how in ((), ("--renderer", "exact", "--device", "cpu"))[: 1 if body == PATH else 2]:
+        assert run("render", svg, "-o", png, *how) == 0
+        with Image.open(png) as picture:
+            assert picture.size == pixels
+            if body != PATH:
+                colour = (255, 0, 0, 255) if body else (0, 0, 0, 0)
+                assert picture.convert("RGBA").getpixel((15, 10)) == colour
 
 
 def test_standard_streams(

@@ -159,20 +159,11 @@ def test_a_suggestion_in_words(
     assert lines[-1].strip() == f"warpsplat vectorize {image} --curves {made.curves} -o photo.svg"
 
 
-def test_the_suggestion_is_where_more_shapes_gain_little() -> None:
-    made = suggestion(Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0))
-    # Decibels a shape are 2 / (shapes ln 2): a hundred buy half of one at 577, 10 kB (156 shapes) at 902.
-    assert (made.by_shapes, made.by_bytes, made.curves) == (580, 900, 580)
-    assert "Up to there 100 more buy 0.5 dB at least" in made.why
-    assert [one.shapes for one in made.expected] == [145, 290, 580, 1024]
-    assert all(
-        one.psnr == pytest.approx(26 + 2 * np.log2(one.shapes / 256), abs=0.01) for one in made.expected
-    )
-
-
 @pytest.mark.parametrize(
     ("worth", "curves", "words"),
     [
+        # Decibels a shape are 2 / (shapes ln 2): a hundred buy half of one at 577, 10 kB (156 shapes) at 902.
+        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0), 580, "Up to there 100 more buy 0.5 dB at least"),
         (Worth(16, 1024, 256, 20.0, 0.8, 0.0, 64.0), 230, ""),
         (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "10 kB more buy 0.5 dB"),
         (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "twice as many 2.0 dB more"),
@@ -186,6 +177,9 @@ def test_more_shapes_than_are_worth_it_are_not_suggested(worth: Worth, curves: i
     made = suggestion(worth)
     assert made.curves == curves and words in made.why
     assert curves in [one.shapes for one in made.expected]
+    for one in made.expected:
+        expected = worth.psnr_there + worth.slope * np.log2(one.shapes / worth.measured)
+        assert one.psnr == pytest.approx(expected, abs=0.01)
 
 
 def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

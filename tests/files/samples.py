@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
+
+from warpsplat.files.sources import image_of
+
+load_image = functools.partial(image_of, paper=1.0)
+"""Read an image on white."""
 
 RNG = np.random.default_rng(0)
 RGB = RNG.integers(0, 256, (20, 33, 3), dtype=np.uint8)

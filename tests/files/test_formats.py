@@ -14,8 +14,9 @@ from PIL import EpsImagePlugin, Image, ImageFile
 import warpsplat
 from tests import ROOT
 from tests.cli.helpers import one_line, run
+from tests.files.samples import load_image
 from warpsplat.errors import ExitCode, ImageError
-from warpsplat.files.image import FORMATS, image_facts, load_image
+from warpsplat.files.image import FORMATS, image_facts
 from warpsplat.files.sources import load_importance
 
 ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"

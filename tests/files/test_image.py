@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.files.samples import RGB, RNG, bad_files, save
+from tests.files.samples import RGB, RNG, bad_files, load_image, save
 from warpsplat.errors import ImageError
-from warpsplat.files.image import load_image
 
 
 def test_modes(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image, ImageCms
 
 from tests.files.profiles import DISPLAY_P3, SRGB, cmyk_profile, encoded, grey_profile, linear, rgb_profile
+from tests.files.samples import load_image
 from tests.fuzz import corpus
-from warpsplat.files.image import load_image
 from warpsplat.files.profile import profile_of
 from warpsplat.files.sources import image_of
 

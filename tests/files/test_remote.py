@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -94,11 +95,6 @@ def test_writes_atomically_where_the_store_does_not(store: Any, monkeypatch: pyt
 
 
 def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "upath", None)
+    monkeypatch.setitem(sys.modules, "upath", None)
     with pytest.raises(UsageError, match=r'pip install "warpsplat\[remote\]"'):
         remote("memory://bucket/a.png")
-
-
-def test_an_unknown_protocol() -> None:
-    with pytest.raises(UsageError, match="nope://a/b"):
-        remote("nope://a/b")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
+import tempfile
 from pathlib import Path
 
-from tests.fuzz.campaign import Finding, campaign
-from tests.fuzz.cases import TARGETS, Cases
-from tests.fuzz.worker import Worker
+from tests.forks import Forks
+from tests.fuzz.cases import TARGETS, Cases, run_case
 
 
 def main() -> None:
@@ -20,17 +21,21 @@ def main() -> None:
     parser.add_argument("--target", choices=["all", *TARGETS], default="all")
     parser.add_argument("--keep", type=Path, help="folder for the inputs of findings")
     given = parser.parse_args()
-
-    def on_finding(finding: Finding) -> None:
-        print(ascii(finding.line())[1:-1], flush=True)
-        if given.keep:
-            finding.save(given.keep)
-
-    cases, numbers = Cases(given.seed, given.target), range(given.first, given.first + given.count)
-    with Worker() as worker:
-        tally = campaign(cases, numbers, worker, on_finding)
-    print(tally.line())
-    sys.exit(bool(tally.findings))
+    cases, codes, findings = Cases(given.seed, given.target), [], 0
+    with tempfile.TemporaryDirectory() as scratch, contextlib.closing(Forks(Path(scratch))) as forks:
+        for number in range(given.first, given.first + given.count):
+            case = cases[number]
+            for outcome, fault in run_case(forks, case, Path(scratch, "deep", "down", "case")):
+                codes.append(outcome.code)
+                if fault:
+                    findings += 1
+                    print(ascii(fault)[1:-1], flush=True)
+                    if given.keep:
+                        given.keep.mkdir(parents=True, exist_ok=True)
+                        name = f"{case.target}-{case.index}{Path(case.name).suffix}"
+                        (given.keep / name).write_bytes(case.data)
+    print(f"{len(codes)} commands ({codes.count(0)} accepted), {findings} findings")
+    sys.exit(bool(findings))
 
 
 if __name__ == "__main__":

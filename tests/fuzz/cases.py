@@ -1,21 +1,24 @@
-"""Cases: a changed input with the commands that take it, and the judgement of their outcomes."""
+"""Cases: a changed input with the commands that take it; running them, and judging the outcomes."""
 
 from __future__ import annotations
 
 import json
+import os
 import random
 import re
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from PIL import Image
 
+from tests.forks import Forks, Outcome
 from tests.fuzz import checkpoints, corpus
 from tests.fuzz import vocabulary as words
 from tests.fuzz.corpus import Seed
 from tests.fuzz.mutate import mutate_bytes, mutate_png, mutate_text
-from tests.fuzz.worker import MAX_MEMORY, MAX_SECONDS, PATIENCE, Outcome
 from warpsplat.batch.manifest import Entry
 from warpsplat.errors import ExitCode
 from warpsplat.fit.settings import make_settings
@@ -23,6 +26,13 @@ from warpsplat.run.result import job_key
 
 Mutation = Callable[[random.Random, bytes, bytes], bytes]
 """(generator, input, another input) -> changed input."""
+
+MAX_SECONDS = 10.0
+"""Longest run on a small input, in processor time, which other programs do not lengthen [s]."""
+PATIENCE = 100
+"""Time after which a command is ended [s]."""
+MAX_MEMORY, ADDRESSES = 2 << 30, 32 << 30
+"""Most memory of a run, and most that it can allocate [bytes]."""
 
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "2")
 
@@ -145,10 +155,6 @@ def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
     return (mutate_png if is_png else mutate_bytes)(rng, data, other)
 
 
-def _text_mutation(vocabulary: tuple[str, ...], snippets: tuple[str, ...]) -> Mutation:
-    return lambda rng, data, other: mutate_text(rng, data, other, vocabulary, snippets)
-
-
 @dataclass(frozen=True)
 class Target:
     """A kind of input."""
@@ -160,16 +166,12 @@ class Target:
     """Its weight in a run over all targets."""
 
 
-_SVG = _text_mutation(words.SVG_WORDS, words.SVG_SNIPPETS)
-_YAML = _text_mutation(words.YAML_WORDS, words.YAML_SNIPPETS)
-_JSON = _text_mutation(words.JSON_WORDS, words.JSON_SNIPPETS)
-
 TARGETS = {
     "image": Target(corpus.images, _changed_image, _image_commands, 9),
-    "svg": Target(corpus.svgs, _SVG, _svg_commands, 8),
-    "yaml": Target(corpus.yamls, _YAML, _yaml_commands, 2),
+    "svg": Target(corpus.svgs, partial(mutate_text, words=words.SVG_WORDS), _svg_commands, 8),
+    "yaml": Target(corpus.yamls, partial(mutate_text, words=words.YAML_WORDS), _yaml_commands, 2),
     "options": Target(lambda: [Seed("in.txt", b"-")], lambda rng, data, other: data, _option_commands, 1),
-    "manifest": Target(_manifests, _JSON, _manifest_commands, 1),
+    "manifest": Target(_manifests, partial(mutate_text, words=words.JSON_WORDS), _manifest_commands, 1),
     "checkpoint": Target(checkpoints.checkpoints, checkpoints.changed, _checkpoint_commands, 2),
 }
 
@@ -192,6 +194,33 @@ class Cases:
         return Case(name, index, seed.name, file, data, target.commands(rng, file))
 
 
+def lay_out(case: Case, folder: Path) -> None:
+    """Make an empty folder with the case's files."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for name, data in {**FILES, case.name: case.data}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
+def run_case(forks: Forks, case: Case, folder: Path) -> Iterator[tuple[Outcome, str]]:
+    """Run a case's commands up to the first that goes wrong; yield each outcome and its fault, if any."""
+    lay_out(case, folder)
+    given = folder / case.name
+    for command in case.commands:
+        stdin = str(folder / command.stdin) if command.stdin else os.devnull
+        how = {"stdin": stdin, "memory": ADDRESSES, "patience": PATIENCE}
+        outcome = forks.outcome(command.arguments, folder, **how)
+        fault = judge(command, outcome, folder)
+        if command.consumes and outcome.code == 0:
+            fault = fault or ("the input is left" if given.exists() else "")
+        elif not fault and given.read_bytes() != case.data:
+            fault = "the input was changed"
+        line = f"{case.target} {case.index} ({case.seed}): warpsplat {' '.join(command.arguments)}: {fault}"
+        yield outcome, line if fault else ""
+        if fault:
+            return
+
+
 LINE = re.compile(r"warpsplat: [^\x00-\x1f\x7f-\x9f]+\n?")
 BATCH_LINE = re.compile(r"(warpsplat: |\[\d+/\d+\] |failed:|  |in/|case)[^\x00-\x1f\x7f-\x9f]*")
 
@@ -199,8 +228,6 @@ BATCH_LINE = re.compile(r"(warpsplat: |\[\d+/\d+\] |failed:|  |in/|case)[^\x00-\
 def judge(command: Command, outcome: Outcome, folder: Path) -> str:
     """Return what is wrong with the outcome, in a few words; empty: nothing is."""
     code = outcome.code
-    if outcome.timed_out:
-        return f"no end within {PATIENCE:g} s"
     if code < 0:
         return f"ended by signal {-code}"
     if "Traceback" in outcome.stderr:

@@ -7,4 +7,6 @@ from pathlib import Path
 
 from hypothesis.configuration import set_hypothesis_home_dir
 
+from tests.cli.conftest import forks  # noqa: F401
+
 set_hypothesis_home_dir(Path(tempfile.gettempdir()) / "warpsplat-test-hypothesis")

@@ -16,6 +16,25 @@ MOST = 200_000
 INTERESTING = (*range(4), *(2**n + d for n in (3, 4, 5, 7, 8, 12, 15, 16, 31, 32) for d in (-1, 0)))
 """Numbers at which behaviour often changes."""
 
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
+WORD = re.compile(r"[A-Za-z][\w-]*")
+ATTRIBUTE = re.compile(r"[\w:-]+\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+ELEMENT = re.compile(r"<[a-zA-Z][^<>]*/>|<([a-zA-Z]+)\b[^<>]*>[^<>]*</\1>")
+TAG = re.compile(r"</?[a-zA-Z][^<>]*>")
+PLACE = re.compile(r"(?<=[>\n])")
+"""Between two tags, or at the start of a line."""
+
+NESTS = (
+    "<g>",
+    '<g transform="scale(1e9)">',
+    '<svg opacity=".9">',
+    "<a>",
+    "<switch>",
+    "<symbol>",
+    "<defs>",
+    "<mask>",
+)
+
 
 def mutate_bytes(rng: random.Random, data: bytes, other: bytes) -> bytes:
     """Make one to a few changes, of any kind, anywhere; ``other``: another input, to take a part of."""
@@ -69,62 +88,37 @@ def mutate_png(rng: random.Random, data: bytes, other: bytes) -> bytes:
     return data[:8] + b"".join(packed)
 
 
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
-WORD = re.compile(r"[A-Za-z][\w-]*")
-ATTRIBUTE = re.compile(r"[\w:-]+\s*=\s*(?:\"[^\"]*\"|'[^']*')")
-ELEMENT = re.compile(r"<[a-zA-Z][^<>]*/>|<([a-zA-Z]+)\b[^<>]*>[^<>]*</\1>")
-TAG = re.compile(r"</?[a-zA-Z][^<>]*>")
-
-
-def mutate_text(
-    rng: random.Random, data: bytes, other: bytes, words: tuple[str, ...], snippets: tuple[str, ...]
-) -> bytes:
-    """Make one to a few changes to tokens of a text (XML, YAML or JSON), or seldom to its bytes."""
+def mutate_text(rng: random.Random, data: bytes, other: bytes, words: tuple[str, ...]) -> bytes:
+    """Change tokens of a text (XML, YAML or JSON), or seldom its bytes or its encoding."""
     if rng.random() < 0.1:
         return mutate_bytes(rng, data, other)
     text = data.decode("utf-8", "replace")
     for _ in range(rng.choice((1, 1, 2, 2, 3, 5))):
-        if rng.random() < 0.2:
-            # Rather between two tags or at a line's start than in the middle of a word.
-            places = [m.end() for m in re.finditer(r">|\n", text)] if rng.random() < 0.7 else []
-            place = rng.choice(places or range(len(text) + 1))
-            text = text[:place] + rng.choice(snippets) + text[place:]
-        else:
-            text = _change_token(rng, text, words)
-        text = text[:MOST]
-    return _encode(rng, text)
-
-
-def _change_token(rng: random.Random, text: str, words: tuple[str, ...]) -> str:
-    """Replace, remove, repeat or wrap one token."""
-    pattern = rng.choice((NUMBER, NUMBER, NUMBER, WORD, WORD, ATTRIBUTE, ELEMENT, TAG))
-    tokens = list(pattern.finditer(text))
-    if not tokens:
-        return text
-    found = rng.choice(tokens)
-    token = new = found[0]
-    if pattern is NUMBER:
-        new = rng.choice(NUMBERS)
-    elif pattern is WORD:
-        new = rng.choice(words)
-    elif pattern is ELEMENT:
-        tag = rng.choice(("g", "svg", "a", "switch", "symbol", "defs", "mask"))
-        attribute = rng.choice(("", ' transform="scale(1e9)"', ' opacity=".9"', ' style="fill:red"'))
-        depth = rng.choice((2, 20, 200, 300, 1000, 3000))
-        new = f"<{tag}{attribute}>" * depth + token + f"</{tag}>" * depth
-    else:
-        new = rng.choice(tokens)[0]
-    new = rng.choice((new, new, new, "", " ".join([token] * rng.choice((2, 3, 20, 100)))))
-    return text[: found.start()] + new + text[found.end() :]
-
-
-def _encode(rng: random.Random, text: str) -> bytes:
-    """Return bytes: in UTF-8, or sometimes in another encoding, packed, or with a false declaration."""
+        text = _change_token(rng, text, words)[:MOST]
     if rng.random() < 0.93:
         return text.encode("utf-8", "surrogatepass")
     name = rng.choice(["gzip", "utf-8-sig", "utf-16", "utf-16-le", "latin-1", "utf-32", "cp037", "utf-8"])
     if name == "gzip":
         packed = gzip.compress(text.encode("utf-8", "replace"), 1, mtime=0)
         return packed if rng.random() < 0.5 else mutate_bytes(rng, packed, packed)
-    declared = rng.choice(["utf-16", "shift_jis", "rot13", "nonsense", "utf-7"]) if name == "utf-8" else name
+    declared = rng.choice([name, "utf-16", "shift_jis", "rot13", "nonsense", "utf-7"])
     return f'<?xml version="1.0" encoding="{declared}"?>\n{text}'.encode(name, "replace")
+
+
+def _change_token(rng: random.Random, text: str, words: tuple[str, ...]) -> str:
+    """Replace, remove, repeat or wrap one token, or insert one of ``words``."""
+    pattern = rng.choice((NUMBER, NUMBER, NUMBER, WORD, WORD, ATTRIBUTE, ELEMENT, TAG, PLACE, PLACE))
+    tokens = list(pattern.finditer(text))
+    if not tokens:
+        return text
+    found = rng.choice(tokens)
+    token, new = found[0], rng.choice(tokens)[0]
+    if pattern is NUMBER:
+        new = rng.choice(NUMBERS)
+    elif pattern in (WORD, PLACE):
+        new = rng.choice(words)
+    elif pattern is ELEMENT:
+        start, depth = rng.choice(NESTS), rng.choice((2, 20, 200, 300, 1000, 3000))
+        new = start * depth + token + f"</{start.strip('<>').split()[0]}>" * depth
+    new = rng.choice((new, new, new, "", " ".join([token] * rng.choice((2, 3, 20, 100)))))
+    return text[: found.start()] + new + text[found.end() :]

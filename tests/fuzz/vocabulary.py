@@ -58,9 +58,6 @@ SVG_WORDS = (
     "stroke-linecap", "stroke-linejoin", "preserveAspectRatio", "none", "inherit", "currentColor", "evenodd", "hidden", "auto",
     "scale", "rotate", "translate", "matrix", "skewX", "url", "rgb", "rgba", "hsl", "white", "transparent", "em", "ex", "px",
     "M", "m", "L", "l", "H", "v", "C", "c", "S", "Q", "T", "q", "t", "A", "a", "Z", "z", "xMidYMid", "meet", "slice",
-)  # fmt: skip
-
-SVG_SNIPPETS = (
     *SHAPES,
     "<!-- " + "<path " * 3000 + "-->",
     "<!--" + "fill:" + " " * 5000 + "-->",
@@ -105,9 +102,6 @@ YAML_WORDS = (
     "cpu", "cuda", "in", "a.png", "b.jpg", "out", "60s", "10GB", "1e3", "presets", "preset", "matrix", "rates", "{stem}", "{folder}", "{curves}",
     "paint", "linear", "radial", "layered", "levels", "colors", "palette", "opaque", "max-memory", "background", "none", "title", "size", "page",
     "units", "ids", "minify", "mixed", "subject", "photo", "drawing", "line", "pixel", "importance", "rates", "density", "2GB", "a4", "1,4",
-)  # fmt: skip
-
-YAML_SNIPPETS = (
     "[" * 2000, "{" * 2000, "[" * 50 + "]" * 50, "- " * 500, "? " * 300, "&x ", "*x", "*d", "<<: *d\n", "!!python/object:os.system ", "!!binary a", "!!int x ",
     "!!float .nan ", "!!timestamp 2001-99-99 ", '"\\U00110000"', '"\\ud800"', '"a\\0b"', "'in/a\x00.png'", "in/" + "x" * 300, "../" * 40, "~nobody/", "~/",
     "in/[", "**", "***", "?", "\t", "\r", "\u2028", "\ufeff", "\x07", "  ", "\n", "\n---\n", "\n...\n", "%TAG ! x\n", "|\n", ">2\n", "# ", ": ", "- ", ", ",
@@ -118,9 +112,6 @@ YAML_SNIPPETS = (
 JSON_WORDS = (
     "v", "time", "output", "key", "event", "digest", "error", "figures", "made", "failed", "step", "curves", "per_pixel",
     "colored", "generator", "room", "fits", "state", "slots", "PCG64", "true", "false", "null", "NaN", "Infinity", "out/a.svg", "1e308",
-)  # fmt: skip
-
-JSON_SNIPPETS = (
     "\n", "{", "}", "[", "]", ",", '"', "[" * 2000, "[0]", "{}\n", "null,", "1e999", "9" * 5000, '"fits": [],', '"\\ud800"',
     '"\\u0000"', "-", "\0", '{"v": 1}\n', '"v": 2', "../../x.svg",
 )  # fmt: skip

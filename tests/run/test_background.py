@@ -11,7 +11,7 @@ from PIL import Image
 
 import warpsplat
 from tests.runs import scored
-from warpsplat.files.image import load_image
+from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.run.prepare import load_target
@@ -45,13 +45,13 @@ def test_a_transparent_image_makes_a_transparent_file(tmp_path: Path, device: st
     result, text = made(tmp_path, device, badge())
     assert "<rect" not in text
     shown = np.asarray(render_own(text).convert("RGBA"))
-    wanted = load_image(badge(), paper=None)
+    wanted = image_of(badge())
     empty = wanted[..., 3] == 0
     assert not shown[:4][empty[:4]].any(), "far from what is drawn"
     assert (shown[..., 3][empty] > 0).mean() < 0.03, "and but for a few pixels beside it"
     assert scored(result).psnr > 22
     # White on white tells nothing: the figure is that on black.
-    on_white = score_svg(text, load_image(badge())).psnr
+    on_white = score_svg(text, image_of(badge(), paper=1.0)).psnr
     assert scored(result).psnr < on_white
 
 

@@ -16,7 +16,8 @@ import warpsplat
 from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
 from warpsplat.errors import ExitCode, ResourceError
-from warpsplat.files.image import ImageFacts, boxed, image_facts, load_image, load_rows
+from warpsplat.files.image import ImageFacts, boxed, image_facts, load_rows
+from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.native import container_limits
 from warpsplat.rendering.parameters import Parameters
@@ -120,8 +121,8 @@ def test_the_limits_of_containers_are_seen(tmp_path: Path) -> None:
 def test_an_image_is_read_smaller(mode: str, kind: str, options: dict[str, object], factor: int) -> None:
     """A pixel is the mean of its square; what a JPEG's decoder makes of it is nearly that."""
     data = encoded(pixels(mode), kind, **options)
-    whole = load_image(data, paper=None)
-    small = load_image(data, paper=None, factor=factor)
+    whole = image_of(data)
+    small = image_of(data, factor=factor)
     assert small.shape == (-(-HEIGHT // factor), -(-WIDTH // factor), 4 if mode == "RGBA" else 3)
     apart = np.abs(small - boxed(whole, factor))
     assert apart.mean() < (0.02 if kind == "JPEG" else 1e-6)
@@ -136,7 +137,7 @@ def test_a_turned_image_is_read_smaller() -> None:
     exif = Image.Exif()
     exif[0x0112] = 6
     data = encoded(pixels(), "JPEG", exif=exif, quality=95)
-    assert load_image(data, factor=2).shape == (33, 25, 3)
+    assert image_of(data, factor=2).shape == (33, 25, 3)
     facts = image_facts(data)
     assert facts and (facts.width, facts.height) == (HEIGHT, WIDTH)
 
@@ -145,7 +146,7 @@ def test_a_turned_image_is_read_smaller() -> None:
 def test_strips_of_an_image_are_those_of_all_of_it(mode: str) -> None:
     data = encoded(pixels(mode))
     paper = None if mode == "RGBA" else 1.0
-    image = load_image(data, paper=paper)
+    image = image_of(data, paper=paper)
     whole = load_rows(data, paper, image.shape[2])
     assert whole.shape == image.shape
     for rows in (slice(0, 7), slice(30, 49), slice(30, 49), slice(0, 49)):

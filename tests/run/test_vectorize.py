@@ -13,7 +13,7 @@ from tests import ROOT
 from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from warpsplat.extensions import renderer_names
-from warpsplat.files.image import load_image
+from warpsplat.files.sources import image_of
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.rendering.backend import Backend
@@ -70,7 +70,7 @@ FIGURES = [
 def test_a_photograph_reaches_its_figure(renderer: str, kind: Kind, figure: float, gap: float) -> None:
     """451x300, 192 curves, 100 steps: PSNR of the file, and how much more the training render has."""
     settings = make_settings(renderer=renderer, kind=kind, curves=192, iterations=100, coarse_pixels=30_000)
-    result = vectorize(load_image(CAT), settings, Backend.on("cpu"))
+    result = vectorize(image_of(CAT), settings, Backend.on("cpu"))
     assert scored(result).psnr > figure
     assert abs(result.render_psnr - scored(result).psnr) < gap
 
@@ -136,7 +136,7 @@ def test_max_bytes_is_kept(device: str) -> None:
 def test_max_bytes_are_used(device: str, kind: Kind, precision: int) -> None:
     """The shapes of a photograph take a little more than the limit, and the least of them go."""
     settings = make_settings("draft", curves=900, kind=kind, precision=precision, max_bytes="20KB")
-    result = vectorize(load_image(CAT), replace(settings, iterations=30), Backend.on(device))
+    result = vectorize(image_of(CAT), replace(settings, iterations=30), Backend.on(device))
     assert 0.95 * 20_000 < scored(result).bytes <= 20_000
     assert result.missed == ()
 

@@ -15,7 +15,7 @@ from PIL import Image
 from tests.fit.pictures import picture
 from tests.runs import vectorize
 from tests.tracers import SIZES, bands, stub
-from warpsplat.files.image import load_image
+from warpsplat.files.sources import image_of
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
@@ -51,7 +51,7 @@ def test_the_tracer_sees_the_image_on_white(tmp_path: Path) -> None:
     rgba = np.random.default_rng(0).integers(0, 256, (20, 30, 4), dtype=np.uint8)
     rgba[:10, :, 3] = 0
     Image.fromarray(rgba).save(tmp_path / "a.png")
-    target = load_image(tmp_path / "a.png")
+    target = image_of(tmp_path / "a.png", paper=1.0)
     seen: list[np.ndarray] = []
 
     def trace(png: bytes, options: TracerOptions) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from warpsplat.cli.options import (
     overwrite_option,
     quality_options,
     threads_option,
+    together,
     verbosity_options,
 )
 from warpsplat.errors import shown
@@ -60,9 +60,7 @@ class Shard(click.ParamType):
         return int(found[1]), int(found[2])
 
 
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-OPTIONS: tuple[Decorator, ...] = (
+batch_options = together(
     click.option(
         "-o",
         "--output",
@@ -112,7 +110,7 @@ OPTIONS: tuple[Decorator, ...] = (
     )
     if "pages" in extensions()
     else lambda function: function,
-    quality_options,
+    quality_options(),
     importance_option,
     click.option("--device", help="auto (a GPU if there is one), cpu, or cuda:N."),
     threads_option,
@@ -121,11 +119,4 @@ OPTIONS: tuple[Decorator, ...] = (
         "--json", "as_json", is_flag=True, help="Print a JSON object for each image, and one at the end."
     ),
 )
-"""Decorators of the command, in the order of its help."""
-
-
-def batch_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add all options of the command."""
-    for option in reversed(OPTIONS):
-        function = option(function)
-    return function
+"""All options of the command."""

@@ -9,10 +9,9 @@ import contextlib
 import io
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,14 +19,11 @@ import numpy.typing as npt
 from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError, cause_of
-from warpsplat.files.inputs import input_name, read_input
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.native import messages_hidden
 from warpsplat.portable.filters import resize_area
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray
-
-Taken = TypeVar("Taken")
 
 FORMATS = (
     *("PNG", "JPEG", "GIF", "BMP", "PPM", "WEBP", "AVIF", "TIFF", "JPEG2000", "ICO", "QOI", "PCX", "SGI"),
@@ -60,61 +56,28 @@ LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 grey."""
 
 
-def load_image(
-    source: Path | bytes,
-    name: str | None = None,
-    *,
-    paper: float | FloatArray | None = 1.0,
-    factor: int = 1,
-) -> FloatArray:
-    """Read an image: first frame, EXIF rotation and colour profile applied, transparency on ``paper``.
+@contextlib.contextmanager
+def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.Image, int]]:
+    """Decode an image, upright, and yield it with how many times smaller it must still become.
 
-    Args:
-        source: A file, ``-`` for the standard input, or the bytes of an image.
-        name: What messages call the image; None: its path.
-        paper: Grey level or colour that transparency is composited on; None: transparency is kept.
-        factor: How many times smaller to read it, see ``reduced``. JPEGs are then decoded with less memory
-            and time.
-
-    Returns:
-        sRGB in [0, 1], shape (height, width, 3), float32; if transparency is kept and there is some,
-        premultiplied with opacity, shape (height, width, 4). Grey images of 16 bits keep their precision.
+    That is ``factor``, less what decoding has done. Errors in the block become ``ImageError`` as well.
 
     Raises:
-        ImageError: Missing, unreadable, truncated, not an image, too large, too small, or with pixels that
-            are not numbers. The message is one line that names the image and the cause.
-    """
-    if isinstance(source, Path):
-        name = name or input_name(source)
-        source = read_input(source)
-    name = name or "the image"
-    return read_image(source, name, lambda image, left: reduced(image, paper, left, name), factor)
-
-
-def read_image(source: bytes, name: str, take: Callable[[Image.Image, int], Taken], factor: int = 1) -> Taken:
-    """Return the result of ``take`` for an image that is decoded and upright; raises as ``load_image``.
-
-    Its second argument is how many times smaller the image must still become: ``factor``, less what decoding
-    has done.
+        ImageError: As ``files.sources.image_of``.
     """
     try:
-        # Pillow warns about odd metadata in images that it can read, and about bombs, which are refused;
-        # libtiff prints warnings about any file.
-        with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
-            warnings.simplefilter("ignore")
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with open_image(source) as opened:
-                width, height = opened.size
-                check_size(width, height)
-                if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
-                    raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
-                _check_covered(opened)
-                rawmode = _rawmode(opened)
-                left = factor // _draft(opened, factor)
-                opened.load()
-                _fix_transparency(opened, rawmode, source)
-                ImageOps.exif_transpose(opened, in_place=True)
-                return take(opened, left)
+        with _opened(source) as image:
+            width, height = image.size
+            check_size(width, height)
+            if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
+                raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
+            _check_covered(image)
+            rawmode = _rawmode(image)
+            left = factor // _draft(image, factor)
+            image.load()
+            _fix_transparency(image, rawmode, source)
+            ImageOps.exif_transpose(image, in_place=True)
+            yield image, left
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except MemoryError:
@@ -136,27 +99,26 @@ def check_size(width: int, height: int) -> None:
         raise ImageError(TOO_LARGE)
 
 
-def open_image(data: bytes) -> Image.Image:
-    """Open an image of ``FORMATS``, reading its header only; raises ``UnidentifiedImageError`` for others.
-
-    The only place where Pillow opens a file of unknown origin.
-    """
-    return Image.open(io.BytesIO(data), formats=FORMATS)
-
-
 _decoding = threading.Lock()
 """Pillow's limit and Python's warnings are global: one thread at a time changes them."""
 
 
 @contextlib.contextmanager
-def _pixel_limit() -> Iterator[None]:
-    """Set Pillow's limit, which its decoders look up, to ``MAX_PIXELS``."""
-    before = Image.MAX_IMAGE_PIXELS
-    Image.MAX_IMAGE_PIXELS = MAX_PIXELS
-    try:
-        yield
-    finally:
-        Image.MAX_IMAGE_PIXELS = before
+def _opened(data: bytes) -> Iterator[Image.Image]:
+    """Open an image of ``FORMATS``, the only place that does; raises ``UnidentifiedImageError`` for others.
+
+    Pillow's limit is ``MAX_PIXELS`` in the block, and its warnings about odd metadata and those that libtiff
+    prints about any file are hidden.
+    """
+    with _decoding, warnings.catch_warnings(), messages_hidden():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, MAX_PIXELS
+        try:
+            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                yield image
+        finally:
+            Image.MAX_IMAGE_PIXELS = before
 
 
 def _check_covered(image: Image.Image) -> None:
@@ -193,20 +155,12 @@ def _fix_transparency(image: Image.Image, rawmode: str, data: bytes) -> None:
 def _draft(image: Image.Image, factor: int) -> int:
     """Let a JPEG be decoded 2, 4 or 8 times smaller, at most ``factor``; return how many times."""
     width, height = image.size
-    if factor == 1 or image.format != "JPEG":
-        return 1
-    most = min(factor, DRAFTS[0])
-    image.draft(image.mode, (width // most, height // most))
-    return next(n for n in (*DRAFTS, 1) if image.size == (-(-width // n), -(-height // n)))
+    most = min(factor, 8)
+    drafted = image.draft(image.mode, (width // most, height // most)) if image.format == "JPEG" else None
+    return round(width / drafted[1][2]) if drafted else 1
 
 
-DRAFTS = (8, 4, 2)
-"""Factors by which a JPEG can be decoded smaller."""
-
-
-def reduced(
-    image: Image.Image, paper: float | FloatArray | None, factor: int, name: str = "the image"
-) -> FloatArray:
+def reduced(image: Image.Image, paper: float | FloatArray | None, factor: int, name: str) -> FloatArray:
     """Return an image as ``to_srgb``, ``factor`` times smaller, with its colour profile applied.
 
     A pixel is the mean of a square, cropped at the right and lower border. Only strips are held besides the
@@ -224,10 +178,10 @@ def reduced(
         part = image.crop((0, factor * top, width, min(factor * (top + step), height)))
         small = boxed(to_srgb(part, paper, profile), factor)
         out[top : top + step, :, : small.shape[2]] = small
-    return _without_opacity(out)
+    return without_opacity(out)
 
 
-def _without_opacity(image: FloatArray) -> FloatArray:
+def without_opacity(image: FloatArray) -> FloatArray:
     """Return an image without its opacity if it is opaque."""
     return image[..., :3] if image.shape[2] == 4 and (image[..., 3] == 1).all() else image
 
@@ -252,36 +206,31 @@ class ImageFacts:
 
 
 def image_facts(source: bytes) -> ImageFacts | None:
-    """Return facts of an image without decoding it; None for what ``load_image`` will refuse."""
+    """Return facts of an image without decoding it; None for what ``image_of`` will refuse."""
     try:
-        with _decoding, warnings.catch_warnings(), _pixel_limit(), messages_hidden():
-            warnings.simplefilter("ignore")
-            with open_image(source) as image:
-                width, height = image.size
-                orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
-                bands = 4 if is_deep(image) else SAMPLE_BYTES.get(image.mode, 4)
-                decoded = bands * (2 if orientation != 1 else 1) + (0 if image.format in PLAIN_FORMATS else 8)
-                if is_deep(image):  # all of it is held as floats
-                    decoded += 16
-                if orientation in range(5, 9):
-                    width, height = height, width
-                transparent = "transparency" in image.info or image.mode[-1:] in {"A", "a"}
-                kept = PROGRESSIVE if image.info.get("progressive") else 0
-                drafts = image.format == "JPEG"
-                channels = 4 if transparent else 3
-                return ImageFacts(width, height, channels, decoded, drafts, kept, is_deep(image))
+        with _opened(source) as image:
+            width, height = image.size
+            orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
+            taken = 1 if image.mode in {"1", "L", "P"} else 4  # by a pixel in Pillow's memory
+            taken = taken * (2 if orientation != 1 else 1) + (0 if image.format in PLAIN_FORMATS else 8)
+            if is_deep(image):  # all of it is held as floats
+                taken += 16
+            if orientation in range(5, 9):
+                width, height = height, width
+            kept = 6 if image.info.get("progressive") else 0  # the coefficients of a progressive JPEG
+            channels = 4 if _is_transparent(image) else 3
+            return ImageFacts(width, height, channels, taken, image.format == "JPEG", kept, is_deep(image))
     except Exception:  # Pillow's decoders raise nearly every kind of exception on broken data
         return None
 
 
-SAMPLE_BYTES = {"1": 1, "L": 1, "P": 1}
-"""Bytes of a pixel in Pillow's memory; 4 in all other modes."""
-
 PLAIN_FORMATS = {"JPEG", "PNG", "BMP", "GIF", "TIFF", "PPM", "TGA", "MPO"}
 """Formats that are decoded nearly row by row; decoders of others hold another copy of the image."""
 
-PROGRESSIVE = 6
-"""Bytes a pixel for the coefficients of a progressive JPEG."""
+
+def _is_transparent(image: Image.Image) -> bool:
+    """Return whether pixels of an image may be transparent."""
+    return "transparency" in image.info or image.mode[-1:] in {"A", "a"}
 
 
 def is_deep(image: Image.Image) -> bool:
@@ -312,12 +261,7 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
 def to_srgb(
     image: Image.Image, paper: float | FloatArray | None = 1.0, profile: Profile | None = None
 ) -> FloatArray:
-    """Return a loaded Pillow image of any mode, or a part of one, as ``load_image``.
-
-    Args:
-        image: The image.
-        paper: As for ``load_image``.
-        profile: Its colour profile, see ``profile_of``.
+    """Return a loaded Pillow image of any mode, or a part of one, as ``image_of``; ``profile``: its colours'.
 
     Raises:
         ImageError: Pixels are not numbers.
@@ -326,45 +270,29 @@ def to_srgb(
         grey, opacity = _grey(image)
         if profile:
             grey = interp(grey, np.linspace(0, 1, 256), profile.grey()).astype(np.float32)
-        return composited([(slice(None), np.repeat(grey, 3, axis=2), opacity)], image.size, paper)
-    transparent = "transparency" in image.info or bool({"A", "a"} & set(image.getbands()[-1:]))
-    if transparent:
-        return composited(_straight_strips(image, profile), image.size, paper)
-    out = np.empty((image.height, image.width, 3), np.float32)
+        color = np.repeat(grey, 3, axis=2)
+        return color if opacity is None else without_opacity(composited(color, opacity, paper))
+    transparent = _is_transparent(image)
+    out = np.empty((image.height, image.width, 4 if transparent and paper is None else 3), np.float32)
     for rows, part in _strips(image):
-        rgb = profile.rgb(part) if profile else part.convert("RGB")
-        np.divide(np.asarray(rgb), np.float32(255), out=out[rows])
-    return out
-
-
-Strip = tuple[slice, FloatArray, FloatArray | None]
-"""Rows, their colours (height, width, 3), and their opacity (height, width, 1), if any."""
-
-
-def _straight_strips(image: Image.Image, profile: Profile | None) -> Iterator[Strip]:
-    for rows, part in _strips(image):
-        rgba = profile.rgba(part) if profile else part.convert("RGBA")
-        values = np.asarray(rgba, np.float32) / np.float32(255)
-        yield rows, values[..., :3], values[..., 3:]
-
-
-def composited(
-    strips: Iterable[Strip], size: tuple[int, int], paper: float | FloatArray | None
-) -> FloatArray:
-    """Return strips as an image on ``paper``; None: premultiplied with opacity, unless all are opaque."""
-    width, height = size
-    out = np.empty((height, width, 4 if paper is None else 3), np.float32)
-    for rows, color, opacity in strips:
-        if opacity is None:
-            out[rows, :, :3] = color
-            out[rows, :, 3:] = 1
-            continue
-        out[rows, :, :3] = color * opacity
-        if paper is None:
-            out[rows, :, 3:] = opacity
+        if transparent:
+            rgba = profile.rgba(part) if profile else part.convert("RGBA")
+            values = np.asarray(rgba, np.float32) / np.float32(255)
+            out[rows] = composited(values[..., :3], values[..., 3:], paper)
         else:
-            out[rows] += np.float32(paper) * (1 - opacity)
-    return _without_opacity(out)
+            rgb = profile.rgb(part) if profile else part.convert("RGB")
+            np.divide(np.asarray(rgb), np.float32(255), out=out[rows])
+    return without_opacity(out)
+
+
+def composited(color: FloatArray, opacity: FloatArray, paper: float | FloatArray | None) -> FloatArray:
+    """Return colours (height, width, 3) with an opacity (height, width, 1) on ``paper``; None: premultiplied
+    with the opacity, shape (height, width, 4).
+    """
+    shown = color * opacity
+    if paper is None:
+        return np.concatenate([shown, opacity], axis=2)
+    return np.asarray(shown + np.float32(paper) * (1 - opacity))
 
 
 def _grey(image: Image.Image) -> tuple[FloatArray, FloatArray | None]:
@@ -405,7 +333,7 @@ def _white(image: Image.Image) -> float:
 
 
 class ImageRows:
-    """The pixels of an image as ``load_image`` returns them, converted strip by strip on demand."""
+    """The pixels of an image as ``image_of`` returns them, converted strip by strip on demand."""
 
     def __init__(self, image: Image.Image, paper: float | FloatArray | None, channels: int) -> None:
         """``image`` is upright; ``paper`` and ``channels`` are those of the image that was fitted."""
@@ -426,5 +354,6 @@ class ImageRows:
 
 
 def load_rows(source: bytes, paper: float | FloatArray | None, channels: int) -> ImageRows:
-    """Read an image as ``load_image``, but strip by strip; not for deep grey ones (``is_deep``)."""
-    return read_image(source, "the image", lambda image, _: ImageRows(image, paper, channels))
+    """Read an image as ``image_of``, but strip by strip; not for deep grey ones (``is_deep``)."""
+    with decoded(source, "the image") as (image, _):
+        return ImageRows(image, paper, channels)

@@ -60,18 +60,14 @@ GZIP = b"\x1f\x8b"
 
 def mark_png(png: bytes, key: str = "") -> bytes:
     """Return a PNG with a ``Software`` chunk, which has the ``key`` of the job that made it, if any."""
-    chunk = PNG_MARK + _spaced(key)
+    chunk = PNG_MARK + f" {key}".rstrip().encode()
     whole = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
     return png[:PNG_HEADER] + whole + png[PNG_HEADER:]
 
 
 def mark_pdf(pdf: bytes, key: str = "") -> bytes:
     """Return a PDF with a comment behind its end, as ``mark_png``."""
-    return pdf + b"\n%warpsplat" + _spaced(key) + b"\n"
-
-
-def _spaced(key: str) -> bytes:
-    return f" {key}".encode() if key else b""
+    return pdf + b"\n%warpsplat" + f" {key}".rstrip().encode() + b"\n"
 
 
 def is_marked(head: bytes, tail: bytes) -> bool:

@@ -19,16 +19,13 @@ import sys
 import time
 from pathlib import Path
 
-from warpsplat.errors import OutputError, UsageError, WarpsplatError, cause_of
+from warpsplat.errors import OutputError, UsageError, cause_of
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.marks import HEAD, TAIL, is_marked
 from warpsplat.files.remote import is_remote, read_remote, write_remote
 
 SVG_ENDINGS = (".svg", ".svgz")
 """Endings of SVG files; the second kind is gzipped."""
-
-OLD = 86_400
-"""Age [s] from which a temporary file is left over from a dead run: a write takes seconds."""
 
 _unfinished: set[str] = set()
 """Temporary files of this process."""
@@ -51,9 +48,8 @@ def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), over
         return
     try:
         target = check_target(path)
-        for source in sources:
-            if source.exists() and target == Path(os.path.realpath(source)):
-                raise UsageError(f"{path}: is the input itself; give another output")
+        if any(source.exists() and target == Path(os.path.realpath(source)) for source in sources):
+            raise UsageError(f"{path}: is the input itself; give another output")
         try:
             check_folder(target.parent)
         except UsageError as error:
@@ -168,40 +164,33 @@ def write_atomically(path: Path, data: bytes) -> None:
     Raises:
         OutputError: The disk is full, or the folder cannot be written to; ``path`` is as it was.
     """
-    name: str | None = None
     try:
         target = _target(path)
         handle, name = _temporary(target.parent)
-        with os.fdopen(handle, "wb") as file:
-            _keep_attributes(target, handle)
-            file.write(data)
-            file.flush()
-            os.fsync(handle)
-        os.replace(name, target)
-        _unfinished.discard(name)
-    except BaseException as error:
-        if name:
+        try:
+            with os.fdopen(handle, "wb") as file:
+                _keep_attributes(target, handle)
+                file.write(data)
+                file.flush()
+                os.fsync(handle)
+            os.replace(name, target)
+        finally:
             _discard(name)
-        if isinstance(error, OSError):
-            raise OutputError(f"{path}: could not be written: {cause_of(error)}") from error
-        if isinstance(error, WarpsplatError):
-            raise OutputError(str(error)) from error
-        raise
+    except UsageError as error:
+        raise OutputError(str(error)) from error
+    except OSError as error:
+        raise OutputError(f"{path}: could not be written: {cause_of(error)}") from error
 
 
 def _keep_attributes(target: Path, handle: int) -> None:
     """Give a new file the owner and permissions of the one that it replaces, if any."""
-    try:
+    with contextlib.suppress(FileNotFoundError, AttributeError):  # the latter on Windows
         old = os.stat(target)
-    except FileNotFoundError:
-        return
-    if not hasattr(os, "fchown"):  # Windows
-        return
-    for owner, group in ((-1, old.st_gid), (old.st_uid, -1)):
+        for owner, group in ((-1, old.st_gid), (old.st_uid, -1)):
+            with contextlib.suppress(OSError):
+                os.fchown(handle, owner, group)
         with contextlib.suppress(OSError):
-            os.fchown(handle, owner, group)
-    with contextlib.suppress(OSError):
-        os.fchmod(handle, stat.S_IMODE(old.st_mode))  # last: a new owner clears bits
+            os.fchmod(handle, stat.S_IMODE(old.st_mode))  # last: a new owner clears bits
 
 
 def _machine() -> str:
@@ -228,6 +217,7 @@ def _temporary(folder: Path) -> tuple[int, str]:
 
 
 def _discard(name: str) -> None:
+    """Remove a temporary file, unless it was renamed."""
     with contextlib.suppress(OSError):
         os.unlink(name)
     _unfinished.discard(name)
@@ -247,20 +237,20 @@ def remove_stale(folder: Path) -> None:
             found = TEMPORARY.fullmatch(entry.name)
             if not found or not entry.is_file(follow_symlinks=False):
                 continue
-            dead = found[1] == _machine() and not _alive(int(found[2]))
-            if dead or time.time() - entry.stat(follow_symlinks=False).st_mtime > OLD:
+            dead = found[1] == _machine() and _is_dead(int(found[2]))
+            age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+            if dead or age > 86_400:  # seconds, which is what a write takes
                 with contextlib.suppress(OSError):
                     os.unlink(entry.path)
 
 
-def _alive(process: int) -> bool:
-    """Return whether a process of this machine may be alive."""
-    if os.name != "posix" or process <= 0:
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
+def _is_dead(process: int) -> bool:
+    """Return whether a process of this machine has certainly ended."""
+    if os.name == "posix" and process > 0:
+        try:
+            os.kill(process, 0)
+        except ProcessLookupError:
+            return True
+        except (OSError, OverflowError):
+            pass
+    return False

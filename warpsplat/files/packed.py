@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.errors import CheckpointError, cause_of
+from warpsplat.errors import CheckpointError, cause_of, cut
 from warpsplat.files.inputs import read_input
 
 HEADER = "header.json"
@@ -29,14 +29,8 @@ MARK = b'{"warpsplat": "checkpoint"'
 FORMAT = 1
 """Version of the format; files of others are refused."""
 
-HEAD = 100
-"""Bytes at the start of a file in which its mark stands."""
-
-LONGEST_HEADER = 16 << 20
-"""[bytes]"""
-
-LONGEST_LIST = 16 << 20
-"""Longest central directory of the archive [bytes]."""
+LONGEST = 16 << 20
+"""Longest header, and longest central directory of the archive [bytes]."""
 
 ARRAY = re.compile(
     rb"\x93NUMPY\x01\x00..\{'descr': '(?P<type><[fi]4)', 'fortran_order': False, "
@@ -46,14 +40,11 @@ ARRAY = re.compile(
 """The beginning of ``.npy`` files written here. NumPy's own reader evaluates it as Python, and accepts more:
 other types, Python 2's notation."""
 
-LONGEST_CAUSE = 100
-"""Characters of a library's message."""
-
 
 def is_packed(path: Path) -> bool:
     """Return whether ``path`` begins like a file that ``pack`` made; raises ``OSError``."""
     with path.open("rb") as file:
-        head = file.read(HEAD)
+        head = file.read(100)
     return head.startswith(b"PK") and MARK in head
 
 
@@ -90,8 +81,7 @@ def unpack(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
     except MemoryError:
         raise
     except Exception as error:  # zipfile, json and NumPy raise many kinds on damaged data
-        cause = cause_of(error)[:LONGEST_CAUSE]
-        raise CheckpointError(f"{path}: the checkpoint is damaged: {cause}") from error
+        raise CheckpointError(f"{path}: the checkpoint is damaged: {cut(cause_of(error))}") from error
     return header, arrays
 
 
@@ -100,7 +90,7 @@ def _check_end(data: bytes) -> None:
     end = data[-END:]
     if len(end) < END or end[:4] != b"PK\5\6" or data[-END - LOCATOR :][:4] == b"PK\6\7":
         raise ValueError("its end is missing")
-    if int.from_bytes(end[12:16], "little") > LONGEST_LIST:
+    if int.from_bytes(end[12:16], "little") > LONGEST:
         raise ValueError("it has too many parts")
 
 
@@ -110,7 +100,7 @@ END, LOCATOR = 22, 20
 
 def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
     """Raise ``ValueError`` unless all members are uncompressed and fit in the file together."""
-    if not members or members[0].filename != HEADER or members[0].file_size > LONGEST_HEADER:
+    if not members or members[0].filename != HEADER or members[0].file_size > LONGEST:
         raise ValueError("it has no header")
     if any(info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1 for info in members):
         raise ValueError("a part of it is compressed or encrypted")

@@ -27,11 +27,6 @@ SPACES = {"RGB": "RGB", "GRAY": "L", "CMYK": "CMYK"}
 SAME = 1
 """Largest difference from sRGB, in levels of 255, of a profile for sRGB itself; several exist."""
 
-GRID = 9
-"""Levels of each channel that are compared for that."""
-
-Levels = npt.NDArray[np.uint8]
-
 
 class Profile:
     """A conversion of an image's colours to sRGB; made by ``profile_of``."""
@@ -63,14 +58,11 @@ class Profile:
         """Return whether the conversion changes nothing."""
         if self._mode == "CMYK":
             return False
-        levels = np.linspace(0, 255, GRID).round().astype(np.uint8)
-        if self._mode == "L":
-            grid: Levels = np.arange(256, dtype=np.uint8)[None]
-            shown = np.repeat(grid[..., None], 3, axis=2)
-        else:
-            grid = shown = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
-        found = np.asarray(self.rgb(Image.fromarray(grid)))
-        return bool((np.abs(found.astype(int) - shown) <= SAME).all())
+        levels = np.linspace(0, 255, 9).round().astype(np.uint8)
+        colors = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
+        given = np.arange(256, dtype=np.uint8)[None] if self._mode == "L" else colors
+        found = np.asarray(self.rgb(Image.fromarray(given)))
+        return bool((np.abs(found.astype(int) - np.atleast_3d(given)) <= SAME).all())
 
 
 def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:

@@ -6,12 +6,13 @@ remote files have one type here. ``os.path`` cannot be used with it: check ``is_
 
 from __future__ import annotations
 
+import contextlib
 import re
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path, PurePath
-from typing import Any, TypeVar
+from typing import Any
 
 from warpsplat.errors import ImageError, OutputError, UsageError, WarpsplatError, cause_of, printable
 
@@ -29,8 +30,6 @@ WHOLE = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oci", "memory"
 
 FRESH = 300.0
 """Seconds for which the names in a folder are cached: one request lists a thousand, or asks for one."""
-
-Value = TypeVar("Value")
 
 _listed: dict[str, tuple[float, frozenset[str]]] = {}
 """Folder -> when it was listed, and the names in it."""
@@ -101,12 +100,8 @@ def find_remote(url: str, endings: tuple[str, ...]) -> tuple[list[Path], Path]:
 
 def read_remote(path: Path, limit: int) -> bytes:
     """Return at most ``limit + 1`` bytes of a file; raise ``ImageError`` if it cannot be read."""
-
-    def read() -> bytes:
-        with path.open("rb") as file:
-            return file.read(limit + 1)
-
-    return _asked(read, path, ImageError, "cannot be read")
+    with _errors_as(ImageError, path, "cannot be read"), path.open("rb") as file:
+        return file.read(limit + 1)
 
 
 def write_remote(path: Path, data: bytes) -> None:
@@ -116,8 +111,7 @@ def write_remote(path: Path, data: bytes) -> None:
         OutputError: It could not be written.
     """
     there: Any = path
-
-    def write() -> None:
+    with _errors_as(OutputError, path, "could not be written"):
         if there.protocol in WHOLE:
             there.fs.pipe_file(there.path, data)
             return
@@ -130,8 +124,6 @@ def write_remote(path: Path, data: bytes) -> None:
             beside.unlink(missing_ok=True)
             raise
 
-    _asked(write, path, OutputError, "could not be written")
-
 
 def listed(path: Path) -> bool:
     """Return whether a file was there when its folder was last listed, up to ``FRESH`` seconds ago.
@@ -143,23 +135,22 @@ def listed(path: Path) -> bool:
     folder = str(path.parent)
     when, names = _listed.get(folder, (-FRESH, frozenset()))
     if time.monotonic() - when > FRESH:
-
-        def names_there() -> Iterator[str]:
-            try:
-                there.fs.invalidate_cache()
-                for entry in there.fs.ls(there.parent.path, detail=False):
-                    yield entry.rstrip("/").rpartition("/")[2]
-            except FileNotFoundError:
-                return
-
-        names = _asked(lambda: frozenset(names_there()), path.parent, OutputError, "cannot be listed")
+        names = frozenset()
+        with _errors_as(OutputError, path.parent, "cannot be listed"):
+            there.fs.invalidate_cache()
+            with contextlib.suppress(FileNotFoundError):
+                entries = there.fs.ls(there.parent.path, detail=False)
+                names = frozenset(entry.rstrip("/").rpartition("/")[2] for entry in entries)
         _listed[folder] = (time.monotonic(), names)
     return path.name in names
 
 
 def exists(path: Path) -> bool:
     """Return whether a file is there, by its folder's cached list or by asking; raises ``OutputError``."""
-    return listed(path) or _asked(path.exists, path, OutputError, "cannot be looked for")
+    if listed(path):
+        return True
+    with _errors_as(OutputError, path, "cannot be looked for"):
+        return path.exists()
 
 
 def check_remote(path: Path) -> None:
@@ -169,16 +160,15 @@ def check_remote(path: Path) -> None:
         raise UsageError(f"{printable(str(path))}: nothing can be written to {there.protocol}://")
 
 
-def _asked(
-    question: Callable[[], Value], path: Path, kind: Callable[[str], WarpsplatError], verb: str
-) -> Value:
-    """Return the result of ``question``, or raise an error of ``kind``."""
+@contextlib.contextmanager
+def _errors_as(kind: type[WarpsplatError], path: Path, verb: str) -> Iterator[None]:
+    """Raise errors in the block, each store has its own, as errors of ``kind`` about ``path``."""
     name = printable(str(path))
     try:
-        return question()
+        yield
     except FileNotFoundError:
         raise kind(f"{name}: no such file") from None
-    except Exception as error:  # each store has errors of its own
+    except Exception as error:
         raise kind(f"{name}: {verb}: {_cause(error)}") from error
 
 

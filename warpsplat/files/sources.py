@@ -11,7 +11,7 @@ import numpy.typing as npt
 from PIL import Image, ImageOps
 
 from warpsplat.errors import ImageError, cause_of
-from warpsplat.files.image import boxed, check_size, composited, load_image, reduced
+from warpsplat.files.image import boxed, check_size, composited, decoded, reduced, without_opacity
 from warpsplat.files.inputs import MAX_INPUT, check_data, input_name, read_input
 from warpsplat.portable.filters import grey
 from warpsplat.scene import FloatArray
@@ -78,38 +78,44 @@ def image_of(
     paper: float | FloatArray | None = None,
     factor: int = 1,
 ) -> FloatArray:
-    """Return the pixels of ``source``, as ``load_image``.
+    """Read an image: first frame, EXIF rotation and colour profile applied, transparency on ``paper``.
 
-    They do not depend on the form of the source, except of JPEGs that are read smaller.
+    The pixels do not depend on the form of the source, except of JPEGs that are read smaller.
+
+    Args:
+        source: The image; ``-`` is the standard input.
+        name: What messages call the image; None: its path.
+        paper: Grey level or colour that transparency is composited on; None: transparency is kept.
+        factor: How many times smaller to read it, see ``reduced``. JPEGs are then decoded with less memory
+            and time.
+
+    Returns:
+        sRGB in [0, 1], shape (height, width, 3), float32; if transparency is kept and there is some,
+        premultiplied with opacity, shape (height, width, 4). Grey images of 16 bits keep their precision.
 
     Raises:
-        ImageError: As ``load_image``, or pixels of another shape or type.
+        ImageError: Missing, unreadable, truncated, not an image, too large, too small, pixels of another
+            shape or type, or not numbers. The message is one line that names the image and the cause.
         TypeError: Not an ``ImageSource``.
     """
     name = name or source_name(source)
-    if isinstance(source, np.ndarray):
-        try:
+    if isinstance(source, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
+        with decoded(source_bytes(source), name, factor) as (image, left):
+            return reduced(image, paper, left, name)
+    try:
+        if isinstance(source, np.ndarray):
             pixels = _from_array(source, paper)
             return pixels if factor == 1 else boxed(pixels, factor)
-        except ImageError as error:
-            raise ImageError(f"{name}: {error}") from None
-    if isinstance(source, Image.Image):
-        return _from_pillow(source, name, paper, factor)
-    if isinstance(source, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
-        return load_image(source_bytes(source), name, paper=paper, factor=factor)
-    raise TypeError(
-        f"an image is a path, bytes, a file, a Pillow image or an array, not {type(source).__name__}"
-    )
-
-
-def _from_pillow(image: Image.Image, name: str, paper: float | FloatArray | None, factor: int) -> FloatArray:
-    try:
-        check_size(image.width, image.height)
-        return reduced(ImageOps.exif_transpose(image), paper, factor, name)
+        if isinstance(source, Image.Image):
+            check_size(source.width, source.height)
+            return reduced(ImageOps.exif_transpose(source), paper, factor, name)
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except (OSError, ValueError, SyntaxError) as error:  # a file that Pillow has not read yet may be damaged
         raise ImageError(f"{name}: damaged or unsupported image: {error}") from error
+    raise TypeError(
+        f"an image is a path, bytes, a file, a Pillow image or an array, not {type(source).__name__}"
+    )
 
 
 def _from_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> FloatArray:
@@ -131,9 +137,7 @@ def _from_array(pixels: npt.NDArray[Any], paper: float | FloatArray | None) -> F
     colors = 1 if channels < 3 else 3
     opacity = levels[..., colors:] if channels in {2, 4} else None
     color = np.ascontiguousarray(np.broadcast_to(levels[..., :colors], (height, width, 3)))
-    if opacity is None:
-        return color
-    return composited([(slice(None), color, opacity)], (width, height), paper)
+    return color if opacity is None else without_opacity(composited(color, opacity, paper))
 
 
 def load_importance(

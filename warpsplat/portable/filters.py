@@ -200,26 +200,13 @@ def _convolved(
     return result.reshape(image.shape)
 
 
-def gaussian_weights(sigma: float, size: int) -> list[float]:
-    """Return the weights of a Gaussian kernel of ``size`` pixels, which sum to 1."""
-    offsets = np.arange(size) - (size - 1) / 2
+def gaussian_blur(image: Floats, sigma: float, border: Border = "reflect101") -> Floats:
+    """Return an image blurred by a Gaussian of standard deviation ``sigma`` [px], as OpenCV blurs floats."""
+    reach = (round(8 * sigma + 1) | 1) // 2
+    offsets = np.arange(-reach, reach + 1.0)
     weights = elementary.exp(offsets * offsets * (-0.5 / (sigma * sigma)))
-    return [float(weight) for weight in weights / weights.sum()]
-
-
-def gaussian_blur(
-    image: Floats, sigma: float, border: Border = "reflect101", size: int | None = None
-) -> Floats:
-    """Return an image blurred by a Gaussian, as OpenCV blurs float images.
-
-    Args:
-        image: Shape (height, width) or (height, width, channels).
-        sigma: Standard deviation [px].
-        border: Continuation past the border.
-        size: Side of the kernel [px, odd]; None: it reaches four standard deviations.
-    """
-    weights = gaussian_weights(sigma, size or round(8 * sigma + 1) | 1)
-    return _convolved(image, weights, weights, border)
+    kernel = (weights / weights.sum()).tolist()
+    return _convolved(image, kernel, kernel, border)
 
 
 def box_sum(image: Floats, size: int) -> Floats:
@@ -241,14 +228,10 @@ def sobel(image: Floats) -> tuple[Floats, Floats]:
 
 
 def bilateral(image: Floats, diameter: int, sigma_color: float, sigma_space: float) -> Floats:
-    """Return an image after a bilateral filter, reflected past the border.
+    """Return an image after a bilateral filter over discs of ``diameter`` px (odd), reflected at the border.
 
-    Args:
-        image: Shape (height, width) or (height, width, channels).
-        diameter: Diameter of the disc of neighbours [px, odd].
-        sigma_color: Standard deviation of the weight by colour, in the sum of the channels' absolute
-            differences.
-        sigma_space: Standard deviation of the weight by distance [px].
+    ``sigma_space`` [px] and ``sigma_color`` are the standard deviations of the weights by distance and by the
+    sum of the channels' absolute differences.
     """
     image = _floats(image)
     height, width = image.shape[:2]
@@ -313,12 +296,8 @@ def _bilateral_band(planes: Floats, width: int, reach: int, sigma_color: float, 
 
 
 def remap_linear(image: Floats, x: Floats, y: Floats) -> Floats:
-    """Return the values of an image at places, interpolated linearly; border pixels repeat.
-
-    Args:
-        image: Shape (height, width).
-        x: Columns [px, whole at the centres of pixels], any shape.
-        y: Rows, the same shape.
+    """Return the values of an image (height, width) at columns ``x`` and rows ``y``, arrays of one shape [px,
+    whole at the centres of pixels], interpolated linearly; border pixels repeat.
     """
     image = np.ascontiguousarray(_floats(image))
     height, width = image.shape

@@ -173,17 +173,11 @@ def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
 
 
 def lstsq(matrix: Matrices, right: Matrices) -> Result:
-    """Return the shortest ``x`` with the least squared error of ``matrix @ x = right``."""
+    """Return the shortest ``x`` (n,) with the least squared error of ``matrix @ x = right``, (m, n) and (m,).
+
+    By orthogonalising the columns, or if some are nearly dependent, by the pseudo-inverse.
+    """
     matrix, right = np.asarray(matrix, np.float64), np.asarray(right, np.float64)
-    if right.ndim == 1 and matrix.shape[-2] >= matrix.shape[-1]:
-        found = _orthogonalized(matrix, right)
-        if found is not None:
-            return found
-    return product(pinv(matrix, np.finfo(np.float64).eps * max(matrix.shape[-2:])), right)
-
-
-def _orthogonalized(matrix: Result, right: Result) -> Result | None:
-    """Solve for a vector by orthogonalising the columns; None if some are nearly dependent."""
     size = matrix.shape[1]
     rest = np.concatenate([matrix.T, right[None]])
     whole = (rest * rest).sum(axis=1)
@@ -192,7 +186,7 @@ def _orthogonalized(matrix: Result, right: Result) -> Result | None:
         column = rest[k]
         square = (column * column).sum()
         if square <= DEPENDENT * whole[k]:
-            return None
+            return product(pinv(matrix, np.finfo(np.float64).eps * max(matrix.shape)), right)
         shares[k, k + 1 :] = (column * rest[k + 1 :]).sum(axis=1) / square
         rest[k + 1 :] -= shares[k, k + 1 :, None] * column
     found = shares[:, size].copy()

@@ -11,7 +11,7 @@ from warpsplat.fit.problem import Run
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.step import model_for
-from warpsplat.metrics import Score, psnr, score_svg, ssim
+from warpsplat.metrics import Score, psnr, score_svg, similarities
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.run.memory import PROGRAM, SSIMULACRA2, Reduction, memory_limit
@@ -78,7 +78,7 @@ def render_figures(
     """Return PSNR [dB] and SSIM of the settings' render of ``scene`` against ``target``, both in 8 bits."""
     shown = np.round(255 * np.clip(render(scene, model=model_for(settings, 0), backend=backend), 0, 1))
     wanted = np.round(255 * target)
-    return psnr(shown, wanted), ssim(shown, wanted)
+    return psnr(shown, wanted), similarities(shown, wanted)[0]
 
 
 def render_score(

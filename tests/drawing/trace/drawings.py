@@ -8,7 +8,7 @@ import math
 import numpy as np
 from PIL import Image
 
-from warpsplat.files.image import load_image
+from warpsplat.files.sources import image_of
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_own
 
@@ -55,7 +55,7 @@ def draw(body: str, width: int = 96, height: int = 96, *, hard: bool = False, jp
         image.convert("RGB").save(data, "JPEG", quality=jpeg)
     else:
         image.save(data, "PNG")
-    return load_image(data.getvalue(), paper=None)
+    return image_of(data.getvalue())
 
 
 def ground(color: str, width: int = 96, height: int = 96) -> str:

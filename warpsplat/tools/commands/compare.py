@@ -77,15 +77,15 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
         ImageError: one cannot be read.
         UsageError: two images have the same name.
     """
-    from warpsplat.files.image import load_image
     from warpsplat.files.inputs import input_name, read_input
+    from warpsplat.files.sources import image_of
 
     found: dict[Path, bytes] = {}
     for path in images:
         if path.stem in {other.stem for other in found}:
             raise UsageError(f"{path}: another image has the name {path.stem} as well")
         found[path] = read_input(path)
-        load_image(found[path], input_name(path))
+        image_of(found[path], input_name(path))
     return found
 
 
@@ -140,8 +140,8 @@ def command(
         prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
-    from warpsplat.files.image import load_image
     from warpsplat.files.output import write_result
+    from warpsplat.files.sources import image_of
     from warpsplat.fit.problem import Problem, Run
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
@@ -154,7 +154,7 @@ def command(
     interrupt = Interrupt()
 
     def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
-        with interrupt.watching(), progress_bar(path, ours, quiet=quiet, verbose=verbose) as on_progress:
+        with interrupt.watching(), progress_bar(path, quiet=quiet, verbose=verbose) as on_progress:
             chosen, _ = choose_subject(target, ours)
             image = PreparedImage(Problem(target, chosen))
             return make_result(image, Run(backend, on_progress, interrupt), write)
@@ -164,7 +164,7 @@ def command(
         warm_up(settings[0], backend)
         for path, data in sources.items():
             name = printable(path.name)
-            for row in compare(name, load_image(data), settings, tracer, partial(run, path)):
+            for row in compare(name, image_of(data, paper=1.0), settings, tracer, partial(run, path)):
                 rows.append(row)
                 if output and row.svg:
                     write_result(output / svg_name(path, row.program, row.setting), row.svg.encode())

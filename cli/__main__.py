@@ -1,5 +1,0 @@
-"""``python -m warpsplat.cli``."""
-
-from warpsplat.__main__ import main
-
-main()
