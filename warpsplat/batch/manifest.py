@@ -10,14 +10,13 @@ and key. Such a lock ends with its process, however that ends, and machines that
 
 from __future__ import annotations
 
-import contextlib
 import datetime
 import errno
 import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -29,6 +28,8 @@ try:
     import fcntl
 except ImportError:  # Windows: two batches at once may both make an image
     fcntl = None  # type: ignore[assignment]
+
+LOCK, TRY_LOCK, UNLOCK = (fcntl.LOCK_EX, fcntl.LOCK_EX | fcntl.LOCK_NB, fcntl.LOCK_UN) if fcntl else (0, 0, 0)
 
 NAME = "warpsplat-manifest.jsonl"
 """Default name, in the folder of the results."""
@@ -99,6 +100,11 @@ NUMBERS = ("psnr", "bytes", "shapes", "seconds")
 
 LARGE = 1e15
 """Larger than all figures; excludes infinity, and integers of a million digits."""
+
+
+def digest(data: bytes) -> str:
+    """Return the SHA-256 of a result, hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
 
 
 class Manifest:
@@ -187,10 +193,13 @@ class Manifest:
         """
         assert self._handle is not None, "open"
         try:
-            with self._locked(0):
+            self._lock(LOCK)
+            try:
                 line = (b"" if self._ends_whole() else b"\n") + entry.line()
                 if os.write(self._handle, line) < len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            finally:
+                self._lock(UNLOCK)
         except OSError as error:
             raise OutputError(f"manifest {self.path}: could not be written: {error.strerror}") from error
 
@@ -203,18 +212,10 @@ class Manifest:
         os.lseek(self._handle, size - 1, os.SEEK_SET)
         return os.read(self._handle, 1) == b"\n"
 
-    @contextlib.contextmanager
-    def _locked(self, byte: int) -> Iterator[None]:
-        """Wait for the lock of a byte, and hold it during the block."""
-        if fcntl is None:
-            yield
-            return
-        assert self._handle is not None
-        fcntl.lockf(self._handle, fcntl.LOCK_EX, 1, FIRST_LOCK + byte)
-        try:
-            yield
-        finally:
-            fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, FIRST_LOCK + byte)
+    def _lock(self, operation: int, byte: int = FIRST_LOCK) -> None:
+        """Lock or unlock a byte: ``LOCK``, ``TRY_LOCK`` or ``UNLOCK``."""
+        if fcntl is not None and self._handle is not None:
+            fcntl.lockf(self._handle, operation, 1, byte)
 
     def claim(self, output: Path, key: str) -> bool:
         """Claim a result; return False if another process has.
@@ -222,11 +223,8 @@ class Manifest:
         Raises:
             OutputError: the file system has no locks.
         """
-        if fcntl is None:
-            return True
-        assert self._handle is not None, "open"
         try:
-            fcntl.lockf(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte(output, key))
+            self._lock(TRY_LOCK, self._byte(output, key))
         except (BlockingIOError, PermissionError):
             return False
         except OSError as error:
@@ -236,9 +234,8 @@ class Manifest:
 
     def release(self, output: Path, key: str) -> None:
         """Release a claim."""
-        if fcntl is not None and self._handle is not None:
-            fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, self._byte(output, key))
+        self._lock(UNLOCK, self._byte(output, key))
 
     def _byte(self, output: Path, key: str) -> int:
-        digest = hashlib.sha256(f"{self.name(output)}\0{key}".encode()).digest()
-        return FIRST_LOCK + 1 + int.from_bytes(digest[:8], "big") % FIRST_LOCK
+        place = int(digest(f"{self.name(output)}\0{key}".encode())[:16], 16)
+        return FIRST_LOCK + 1 + place % FIRST_LOCK

@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from warpsplat.batch.executors.work import digest
-from warpsplat.batch.manifest import Entry, Manifest
+from warpsplat.batch.manifest import Entry, Manifest, digest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.inputs import MAX_INPUT

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 
 from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, Stop, Task
 from warpsplat.batch.executors.work import failure
-from warpsplat.batch.manifest import Entry, Event, Manifest
+from warpsplat.batch.manifest import Entry, Event, Manifest, digest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
 from warpsplat.batch.results import ResultState, read_result, result_state
@@ -181,22 +181,20 @@ class Batch:
             self._threads,
             inputs.mask,
             str(job.importance),
-            # A result without a key in it is known by its digest, which is noted before it is written; a
-            # picture is drawn once, for both.
-            bring=is_remote(job.output) or job.settings.minify or is_picture(job.output),
             result=read_result(job.output) if measure else None,
             report_back=self._reports.link_back(job.output) if self._reports else "",
             figures=entry.figures if entry else {},
         )
 
     def _settle(self, outcome: Outcome) -> None:
-        """Write a result if the worker did not; add the outcome to the manifest and report it."""
+        """Write a result, add the outcome to the manifest, and report it."""
         job, (key, before) = self.jobs[outcome.number], self._claims.pop(outcome.number)
         status: Status = "skipped" if outcome.status == "measured" else outcome.status
         error = outcome.error
         try:
-            if outcome.data is not None:
-                self._note(job, outcome, "writing")
+            if outcome.data is not None and outcome.status != "measured":
+                if job.settings.minify or is_picture(job.output) or is_remote(job.output):
+                    self._note(job, outcome, "writing")  # known by its digest, if this process ends now
                 make_folder(job.output.parent)
                 write_result(job.output, outcome.data)
             if outcome.status in ("made", "measured") and not before:
@@ -215,4 +213,5 @@ class Batch:
         """Append an entry to the manifest; a stopped result is ours, but not the job's."""
         key = STOPPED if outcome.status == "stopped" else outcome.key
         name, image = self.manifest.name(job.output), str(job.image)
-        self.manifest.append(Entry(name, key, event, outcome.digest, image, error, outcome.figures))
+        made = "" if outcome.data is None else digest(outcome.data)
+        self.manifest.append(Entry(name, key, event, made, image, error, outcome.figures))

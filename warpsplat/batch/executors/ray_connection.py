@@ -23,7 +23,7 @@ TIMEOUT = 5.0
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[None]:
-    """Connect to a cluster for a block, or use the connection that this process has already, and keep it.
+    """Connect to a cluster for a block.
 
     Args:
         ray: the package Ray.
@@ -32,9 +32,6 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
     Raises:
         UsageError: there is no such cluster, or it has other versions of Ray or Python.
     """
-    if ray.is_initialized():
-        yield
-        return
     with _quiet():
         with _signal_handlers_kept():
             _connect(ray, address)
