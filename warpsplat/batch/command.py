@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -12,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.batch.options import BatchOptions, batch_options
+from warpsplat.batch.options import OPTIONS, BatchOptions
 from warpsplat.cli.echo import echo
+from warpsplat.cli.options import decorated
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.run.options import KINDS
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("inputs", nargs=-1, required=True, metavar="INPUT...")
-@batch_options
+@functools.partial(decorated, options=OPTIONS)
 def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **given: Any) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
 
@@ -105,7 +107,7 @@ def perform(
         WarpsplatError: the batch as a whole cannot be done.
     """
     from warpsplat.batch.display import BatchDisplay
-    from warpsplat.batch.index import Index
+    from warpsplat.batch.index import write_index
     from warpsplat.batch.layers import command_layer
     from warpsplat.batch.manifest import NAME, Manifest
     from warpsplat.batch.plan import home_of, in_shard, plan_jobs
@@ -126,11 +128,10 @@ def perform(
             check_replaceable(jobs, manifest)
         executor, threads = executor_for(jobs, options, interrupt)
         reports = reports_for(jobs, home, manifest, options)
-        index = Index(planned, reports) if reports else None
+        outcomes: dict[Path, JobOutcome] = {}
 
         def on_outcome(outcome: JobOutcome) -> None:
-            if index:
-                index.add(outcome)
+            outcomes[outcome.job.output] = outcome
             display.add(outcome)
 
         batch = Batch(
@@ -148,8 +149,8 @@ def perform(
                 manifest.open()
                 with contextlib.suppress(KeyboardInterrupt), executor:
                     batch.run(executor, interrupt, display.on_progress)
-                if index:
-                    index.write(manifest)
+                if reports:
+                    write_index(reports, planned, outcomes, manifest)
     display.finish(time.monotonic() - begun, executor.workers, manifest.path)
     if not options.dry_run and (display.totals.failures or display.totals.missed):
         sys.exit(ExitCode.SOME_FAILED if display.totals.failures else ExitCode.GOAL_MISSED)

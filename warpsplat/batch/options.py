@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,9 +59,7 @@ class Shard(click.ParamType):
         return int(found[1]), int(found[2])
 
 
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-OPTIONS: tuple[Decorator, ...] = (
+OPTIONS = (
     click.option(
         "-o",
         "--output",
@@ -122,10 +119,3 @@ OPTIONS: tuple[Decorator, ...] = (
     ),
 )
 """Decorators of the command, in the order of its help."""
-
-
-def batch_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add all options of the command."""
-    for option in reversed(OPTIONS):
-        function = option(function)
-    return function
