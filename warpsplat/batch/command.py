@@ -22,9 +22,7 @@ from warpsplat.run.options import KINDS
 
 if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
-    from warpsplat.batch.manifest import Manifest
     from warpsplat.batch.plan import BatchJob
-    from warpsplat.batch.reports import Reports
     from warpsplat.batch.run import JobOutcome
     from warpsplat.cli.options import Request
     from warpsplat.cli.signals import Interrupt
@@ -111,6 +109,7 @@ def perform(
     from warpsplat.batch.layers import command_layer
     from warpsplat.batch.manifest import NAME, Manifest
     from warpsplat.batch.plan import home_of, in_shard, plan_jobs
+    from warpsplat.batch.reports import Reports
     from warpsplat.batch.results import check_replaceable
     from warpsplat.batch.run import Batch
     from warpsplat.cli import signals
@@ -127,7 +126,10 @@ def perform(
         if not options.overwrite:
             check_replaceable(jobs, manifest)
         executor, threads = executor_for(jobs, options, interrupt)
-        reports = reports_for(jobs, home, manifest, options)
+        reports = None
+        if options.report and not options.dry_run:
+            taken = [manifest.path, *(path for job in jobs for path in (job.output, job.image))]
+            reports = Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
         outcomes: dict[Path, JobOutcome] = {}
 
         def on_outcome(outcome: JobOutcome) -> None:
@@ -152,20 +154,8 @@ def perform(
                 if reports:
                     write_index(reports, planned, outcomes, manifest)
     display.finish(time.monotonic() - begun, executor.workers, manifest.path)
-    if not options.dry_run and (display.totals.failures or display.totals.missed):
-        sys.exit(ExitCode.SOME_FAILED if display.totals.failures else ExitCode.GOAL_MISSED)
-
-
-def reports_for(
-    jobs: Sequence[BatchJob], home: Path, manifest: Manifest, options: BatchOptions
-) -> Reports | None:
-    """Return where pages on the results go, or None; raises the errors of ``Reports.at``."""
-    from warpsplat.batch.reports import Reports
-
-    if not options.report or options.dry_run:
-        return None
-    taken = [manifest.path, *(path for job in jobs for path in (job.output, job.image))]
-    return Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
+    if not options.dry_run and (display.failures or display.missed):
+        sys.exit(ExitCode.SOME_FAILED if display.failures else ExitCode.GOAL_MISSED)
 
 
 def executor_for(

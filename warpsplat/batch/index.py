@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpsplat.batch.manifest import Manifest
+from warpsplat.batch.manifest import NUMBERS, Manifest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
 from warpsplat.batch.run import JobOutcome
@@ -15,13 +15,8 @@ from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
 
-ASSETS = ("index.css", "index.js")
-
 MOST_THUMBNAILS = 2000
 """Longer lists have no thumbnails: each is 3 kB."""
-
-FIGURES = ("psnr", "bytes", "shapes", "seconds")
-"""Figures that images can be sorted by, besides their names."""
 
 
 def write_index(
@@ -32,13 +27,13 @@ def write_index(
     Raises:
         OutputError: it cannot be written.
     """
-    from warpsplat.pages import page
+    from warpsplat.pages.environment import page
 
     rows = [_row(reports, job, *_state(job, outcomes.get(job.output), manifest)) for job in jobs]
     if len(jobs) <= MOST_THUMBNAILS:
         for job, row in zip(jobs, rows, strict=True):
             row["thumbnail"] = reports.thumbnail_of(job.output) if row["report"] else ""
-    text = page("index.html.j2", assets=ASSETS, totals=totals(rows), data={"rows": rows})
+    text = page("index.html.j2", assets=("index.css", "index.js"), totals=totals(rows), data={"rows": rows})
     write_result(reports.index, text.encode())
 
 
@@ -68,7 +63,7 @@ def _row(
         "status": status,
         "error": printable(error),
         "exact": "psnr" in figures and figures["psnr"] is None and figures.get("ssim") == 1,
-        **{name: figures.get(name) for name in FIGURES},
+        **{name: figures.get(name) for name in NUMBERS},
     }
 
 

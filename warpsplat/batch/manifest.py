@@ -34,9 +34,6 @@ LOCK, TRY_LOCK, UNLOCK = (fcntl.LOCK_EX, fcntl.LOCK_EX | fcntl.LOCK_NB, fcntl.LO
 NAME = "warpsplat-manifest.jsonl"
 """Default name, in the folder of the results."""
 
-VERSION = 1
-"""Version of a line; later ones are not read."""
-
 MAX_LINE = 1 << 16
 """Longest line that is read [bytes]."""
 
@@ -44,7 +41,7 @@ MAX_FILE = 1 << 30
 """Largest manifest [bytes]: 100,000 images take 60 MB."""
 
 FIRST_LOCK = 1 << 40
-"""First of the bytes that stand for claims; there are as many."""
+"""First of the bytes that stand for claims; there are as many. It is itself the lock of the file's end."""
 
 Event = Literal["made", "failed", "writing"]
 """``writing``: the result is about to be written; by this, one without a mark is known to be ours."""
@@ -67,7 +64,7 @@ class Entry:
     def line(self) -> bytes:
         """Return the entry as a line of the file."""
         now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
-        values = {"v": VERSION, "time": now, **vars(self)}
+        values = {"v": 1, "time": now, **vars(self)}
         text = json.dumps({key: value for key, value in values.items() if value not in ("", {})})
         return text.encode() + b"\n"
 
@@ -78,7 +75,7 @@ def entry_of(line: bytes) -> Entry | None:
         return None
     try:
         values = json.loads(line)
-        if values["v"] != VERSION or values["event"] not in get_args(Event):
+        if values["v"] != 1 or values["event"] not in get_args(Event):
             return None
         texts = {name: values.get(name, "") for name in ("output", "key", "digest", "image", "error")}
         figures = {name: value for name, value in values.get("figures", {}).items() if _is_valid(name, value)}
@@ -90,16 +87,14 @@ def entry_of(line: bytes) -> Entry | None:
         return None
 
 
-def _is_valid(name: str, value: Any) -> bool:
-    """Return whether a figure is a number if sums are made of it or images sorted by it."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return name not in NUMBERS or (is_number and abs(value) < LARGE)
-
-
 NUMBERS = ("psnr", "bytes", "shapes", "seconds")
+"""Figures that sums are made of or images sorted by."""
 
-LARGE = 1e15
-"""Larger than all figures; excludes infinity, and integers of a million digits."""
+
+def _is_valid(name: str, value: Any) -> bool:
+    """Return whether a figure is a number, and no integer of a million digits, if it has to be."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return name not in NUMBERS or (is_number and abs(value) < 1e15)
 
 
 def digest(data: bytes) -> str:

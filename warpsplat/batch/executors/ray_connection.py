@@ -14,12 +14,6 @@ from typing import Any
 
 from warpsplat.errors import UsageError, printable
 
-OBJECT_STORE = 200_000_000
-"""Memory for objects sent between processes, in a cluster of this machine alone [bytes]."""
-
-TIMEOUT = 5.0
-"""Seconds for a cluster to answer."""
-
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[None]:
@@ -71,7 +65,7 @@ def _answers(address: str) -> bool:
     if not host or not port.isdigit():
         return True
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=TIMEOUT).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=5.0).close()
     except (OSError, OverflowError):
         return False
     return True
@@ -80,7 +74,7 @@ def _answers(address: str) -> bool:
 def _init(ray: ModuleType, address: str) -> None:
     options: dict[str, Any] = {"configure_logging": False, "log_to_driver": False}
     if address == "local":
-        options |= {"include_dashboard": False, "object_store_memory": OBJECT_STORE}
+        options |= {"include_dashboard": False, "object_store_memory": 200_000_000}
     try:
         ray.init(address=address, **options)
     except (RuntimeError, ValueError, ImportError) as error:
