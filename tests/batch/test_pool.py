@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.batch import stub
-from warpsplat.batch.executors import pool
+from warpsplat.batch.executors import pool, workers
 from warpsplat.batch.executors.pool import Pool
 from warpsplat.batch.executors.tasks import Outcome, Task
 from warpsplat.errors import ResourceError
@@ -35,9 +35,9 @@ def ignored(number: int, part: float) -> None:
     pass
 
 
-def outcomes(todo: list[Task], workers: int = 1, stop: Callable[[], bool] = never) -> list[Outcome]:
-    with Pool(workers) as used:
-        return sorted(used.run(todo, stop, ignored), key=lambda outcome: outcome.number)
+def outcomes(todo: list[Task]) -> list[Outcome]:
+    with Pool(1) as used:
+        return sorted(used.run(todo, never, ignored), key=lambda outcome: outcome.number)
 
 
 def test_workers_are_kept_and_their_notices_heard(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -53,7 +53,6 @@ def test_a_death_costs_a_second_try_and_a_second_one_the_image(tmp_path: Path) -
     found = outcomes(tasks(tmp_path, "die once", "die", "a"))
     assert [outcome.status for outcome in found] == ["made", "failed", "made"]
     assert found[1].error.startswith("die: its worker process was killed (SIGKILL")
-    assert not list(tmp_path.glob(".warpsplat*"))
 
 
 def test_workers_that_never_begin_end_the_batch(tmp_path: Path) -> None:
@@ -81,11 +80,11 @@ def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_pa
 
 
 def test_what_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "GRACE", 0.1)
+    monkeypatch.setattr(workers, "GRACE", 0.1)
     begun: list[int] = []
     with Pool(1) as used:
         run = used.run(tasks(tmp_path, "hang"), lambda: bool(begun), lambda n, part: begun.append(n))
-        assert [(o.status, o.digest) for o in run] == [("stopped", "")]
+        assert [(o.status, o.data) for o in run] == [("stopped", None)]
 
 
 def test_an_error_in_the_middle_leaves_no_process(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from jinja2 import ChoiceLoader, DictLoader, UndefinedError
 
 from tests.pages.helpers import NASTY, Tags
 from warpsplat.files.marks import PAGE_MARK
-from warpsplat.pages import MARK, environment, page
+from warpsplat.pages import environment
+from warpsplat.pages.environment import MARK, page
 
 SOURCE = """{% extends "base.html.j2" %}{% block title %}{{ name }}{% endblock %}
 {% block main %}<p id="it" title="{{ name }}">{{ name }}</p><a href="{{ name|address }}">x</a>

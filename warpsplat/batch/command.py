@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -12,17 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.batch.options import BatchOptions, batch_options
+from warpsplat.batch.options import OPTIONS, BatchOptions
 from warpsplat.cli.echo import echo
+from warpsplat.cli.options import decorated
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.run.options import KINDS
 
 if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
-    from warpsplat.batch.manifest import Manifest
     from warpsplat.batch.plan import BatchJob
-    from warpsplat.batch.reports import Reports
     from warpsplat.batch.run import JobOutcome
     from warpsplat.cli.options import Request
     from warpsplat.cli.signals import Interrupt
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("inputs", nargs=-1, required=True, metavar="INPUT...")
-@batch_options
+@functools.partial(decorated, options=OPTIONS)
 def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **given: Any) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
 
@@ -105,10 +105,11 @@ def perform(
         WarpsplatError: the batch as a whole cannot be done.
     """
     from warpsplat.batch.display import BatchDisplay
-    from warpsplat.batch.index import Index
+    from warpsplat.batch.index import write_index
     from warpsplat.batch.layers import command_layer
     from warpsplat.batch.manifest import NAME, Manifest
     from warpsplat.batch.plan import home_of, in_shard, plan_jobs
+    from warpsplat.batch.reports import Reports
     from warpsplat.batch.results import check_replaceable
     from warpsplat.batch.run import Batch
     from warpsplat.cli import signals
@@ -125,12 +126,14 @@ def perform(
         if not options.overwrite:
             check_replaceable(jobs, manifest)
         executor, threads = executor_for(jobs, options, interrupt)
-        reports = reports_for(jobs, home, manifest, options)
-        index = Index(planned, reports) if reports else None
+        reports = None
+        if options.report and not options.dry_run:
+            taken = [manifest.path, *(path for job in jobs for path in (job.output, job.image))]
+            reports = Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
+        outcomes: dict[Path, JobOutcome] = {}
 
         def on_outcome(outcome: JobOutcome) -> None:
-            if index:
-                index.add(outcome)
+            outcomes[outcome.job.output] = outcome
             display.add(outcome)
 
         batch = Batch(
@@ -148,23 +151,11 @@ def perform(
                 manifest.open()
                 with contextlib.suppress(KeyboardInterrupt), executor:
                     batch.run(executor, interrupt, display.on_progress)
-                if index:
-                    index.write(manifest)
+                if reports:
+                    write_index(reports, planned, outcomes, manifest)
     display.finish(time.monotonic() - begun, executor.workers, manifest.path)
-    if not options.dry_run and (display.totals.failures or display.totals.missed):
-        sys.exit(ExitCode.SOME_FAILED if display.totals.failures else ExitCode.GOAL_MISSED)
-
-
-def reports_for(
-    jobs: Sequence[BatchJob], home: Path, manifest: Manifest, options: BatchOptions
-) -> Reports | None:
-    """Return where pages on the results go, or None; raises the errors of ``Reports.at``."""
-    from warpsplat.batch.reports import Reports
-
-    if not options.report or options.dry_run:
-        return None
-    taken = [manifest.path, *(path for job in jobs for path in (job.output, job.image))]
-    return Reports.at(options.report, home, taken=taken, overwrite=options.overwrite)
+    if not options.dry_run and (display.failures or display.missed):
+        sys.exit(ExitCode.SOME_FAILED if display.failures else ExitCode.GOAL_MISSED)
 
 
 def executor_for(

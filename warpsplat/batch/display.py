@@ -6,10 +6,8 @@ import json
 import shutil
 import sys
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any
 
 import click
 
@@ -23,103 +21,57 @@ from warpsplat.run.formats import is_picture
 CLEAR = "\r\x1b[2K"
 """Clears the line of a terminal."""
 
-WIDTH = 30
-"""Width of the bar [characters]."""
-
-
-COUNTED = ("made", "skipped", "failed")
-"""Counts that are always in a summary."""
-
-RARE = ("stopped", "planned")
-"""Counts that are in a summary if they are not 0."""
-
-
-@dataclass
-class Totals:
-    """Sums over the outcomes so far."""
-
-    requested: int
-    """Number of images of the batch."""
-    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*COUNTED, *RARE), 0))
-    psnr: list[float] = field(default_factory=list)
-    """PSNR of each image [dB], except those that are reproduced exactly."""
-    bytes: list[int] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-    """Time of each image that was made now."""
-    failures: list[str] = field(default_factory=list)
-    missed: bool = False
-    """Whether an image that was made now misses a goal."""
-
-    def add(self, outcome: JobOutcome) -> None:
-        """Count an outcome."""
-        self.counts[outcome.status] += 1
-        if outcome.error:
-            self.failures.append(outcome.error)
-        figures = outcome.figures
-        for name, values in (("psnr", self.psnr), ("bytes", self.bytes)):
-            if figures.get(name) is not None:
-                values.append(figures[name])
-        if outcome.status == "made":
-            self.seconds.append(figures.get("seconds", 0.0))
-            self.missed |= bool(figures.get("missed"))
-
-    def shown_counts(self) -> dict[str, int]:
-        """Return the counts to show."""
-        counts = {**self.counts, "not started": self.not_started}
-        return {name: n for name, n in counts.items() if n or name in COUNTED}
-
-    @property
-    def seen(self) -> int:
-        """Number of images that have an outcome."""
-        return sum(self.counts.values())
-
-    @property
-    def not_started(self) -> int:
-        """Images that an interrupted batch did not get to."""
-        return self.requested - self.seen
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the values for JSON."""
-        return {
-            "images": self.requested,
-            **{name.replace(" ", "_"): n for name, n in self.shown_counts().items()},
-            "psnr_mean": round(fmean(self.psnr), 3) if self.psnr else None,
-            "psnr_median": round(median(self.psnr), 3) if self.psnr else None,
-            "bytes": sum(self.bytes),
-            "seconds": round(sum(self.seconds), 3),
-        }
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return a table: name, mean, median, sum."""
-        rows: list[tuple[str, ...]] = [("", "mean", "median", "sum")]
-        if self.psnr:
-            rows.append(("PSNR [dB]", f"{fmean(self.psnr):.2f}", f"{median(self.psnr):.2f}", ""))
-        for name, values, scale in (("size [kB]", self.bytes, 1000), ("time [s]", self.seconds, 1)):
-            if values:
-                row = (function(values) / scale for function in (fmean, median, sum))
-                rows.append((name, *(f"{value:.1f}" for value in row)))
-        return rows if len(rows) > 1 else []
+SHOWN = ("made", "skipped", "failed")
+"""Statuses whose counts are always in a summary; others are if they are not 0."""
 
 
 class BatchDisplay:
     """Prints the progress and summary of a batch."""
 
     def __init__(self, total: int, *, quiet: bool, as_json: bool) -> None:
-        self.totals = Totals(total)
         self._total, self._quiet, self._as_json = total, quiet, as_json
         self._bar = sys.stderr.isatty() and not quiet
         self._progress: dict[int, float] = {}
         """Fraction of each job that is done."""
         self._begun: float | None = None
+        self._counts = dict.fromkeys((*SHOWN, "stopped", "planned"), 0)
+        self._psnr: list[float] = []
+        """PSNR of each image [dB], except those that are reproduced exactly."""
+        self._bytes: list[int] = []
+        self._seconds: list[float] = []
+        """Time of each image that was made now."""
+        self.failures: list[str] = []
+        self.missed = False
+        """Whether an image that was made now misses a goal."""
+
+    @property
+    def _seen(self) -> int:
+        return sum(self._counts.values())
+
+    def _count(self, outcome: JobOutcome) -> None:
+        self._counts[outcome.status] += 1
+        if outcome.error:
+            self.failures.append(outcome.error)
+        figures = outcome.figures
+        for name, values in (("psnr", self._psnr), ("bytes", self._bytes)):
+            if figures.get(name) is not None:
+                values.append(figures[name])
+        if outcome.status == "made":
+            self._seconds.append(figures.get("seconds", 0.0))
+            self.missed |= bool(figures.get("missed"))
+
+    def _shown_counts(self) -> dict[str, int]:
+        counts = {**self._counts, "not started": self._total - self._seen}
+        return {name: n for name, n in counts.items() if n or name in SHOWN}
 
     def add(self, outcome: JobOutcome) -> None:
         """Show the outcome of a job."""
-        self.totals.add(outcome)
+        self._count(outcome)
         if self._bar:
             click.echo(CLEAR, nl=False, err=True)
         if self._as_json:
             echo(json.dumps(outcome.as_dict()))
-        count = f"[{self.totals.seen}/{self._total}]"
+        count = f"[{self._seen}/{self._total}]"
         if outcome.error:
             again = " (in an earlier run; --retry-failed tries again)" if outcome.before else ""
             echo(f"{count} failed: {outcome.error}{again}", err=True)
@@ -138,15 +90,12 @@ class BatchDisplay:
     def _draw_bar(self) -> None:
         if not self._bar:
             return
-        counts = self.totals.counts
-        width = min(WIDTH, max(0, shutil.get_terminal_size().columns - 50))
-        full = round(width * self.totals.seen / self._total)
-        failed = f", {counts['failed']} failed" if counts["failed"] else ""
+        width = min(30, max(0, shutil.get_terminal_size().columns - 50))
+        full = round(width * self._seen / self._total)
+        failed = f", {len(self.failures)} failed" if self.failures else ""
         left = self._seconds_left()
         time_left = "" if left is None else f", {left // 60}:{left % 60:02} left"
-        bar = (
-            f"{CLEAR}[{'#' * full}{'-' * (width - full)}] {self.totals.seen}/{self._total}{failed}{time_left}"
-        )
+        bar = f"{CLEAR}[{'#' * full}{'-' * (width - full)}] {self._seen}/{self._total}{failed}{time_left}"
         click.echo(bar, nl=False, err=True)
 
     def _seconds_left(self) -> int | None:
@@ -156,31 +105,55 @@ class BatchDisplay:
             return None
         begun = sum(fraction for fraction in self._progress.values() if fraction < 1)
         rate = done / (time.monotonic() - self._begun)
-        return round(max(0.0, self._total - self.totals.seen - begun) / rate)
+        return round(max(0.0, self._total - self._seen - begun) / rate)
 
     def finish(self, elapsed: float, workers: int, manifest: Path) -> None:
         """Print the summary of a batch that took ``elapsed`` seconds."""
         if self._bar:
             click.echo(CLEAR, nl=False, err=True)
+        counts = self._shown_counts()
         if self._as_json:
-            rest = {"elapsed": round(elapsed, 2), "workers": workers, "manifest": str(manifest)}
-            echo(json.dumps({**self.totals.as_dict(), **rest}))
+            echo(
+                json.dumps(
+                    {
+                        "images": self._total,
+                        **{name.replace(" ", "_"): n for name, n in counts.items()},
+                        "psnr_mean": round(fmean(self._psnr), 3) if self._psnr else None,
+                        "psnr_median": round(median(self._psnr), 3) if self._psnr else None,
+                        "bytes": sum(self._bytes),
+                        "seconds": round(sum(self._seconds), 3),
+                        "elapsed": round(elapsed, 2),
+                        "workers": workers,
+                        "manifest": str(manifest),
+                    }
+                )
+            )
         elif not self._quiet:
-            counts = self.totals.shown_counts()
             did = ", ".join(f"{n} {name}" for name, n in counts.items())
             by = f", {workers} workers" if workers > 1 else ""
             echo(f"{self._total} images: {did} ({elapsed:.1f} s{by})")
-            for row in self.totals.rows():
+            for row in self._table():
                 echo("  ".join([f"  {row[0]:9}", *(f"{cell:>9}" for cell in row[1:])]).rstrip())
-        if self.totals.not_started and not self._quiet:
+        if self._quiet:
+            return
+        if "not started" in counts:
             echo("warpsplat: interrupted; the same command goes on with the rest", err=True)
-        failures = self.totals.failures
-        if failures and not self._quiet:
-            echo("failed:", err=True)
-            for error in failures[:MOST_NAMES]:
-                echo(f"  {error}", err=True)
-            if len(failures) > MOST_NAMES:
-                echo(f"  and {len(failures) - MOST_NAMES} more", err=True)
+        if self.failures:
+            rest = len(self.failures) - MOST_NAMES
+            more = [f"and {rest} more"] if rest > 0 else []
+            for text in ("failed:", *(f"  {error}" for error in [*self.failures[:MOST_NAMES], *more])):
+                echo(text, err=True)
+
+    def _table(self) -> list[tuple[str, ...]]:
+        """Return rows: name, mean, median, sum; none if nothing is known."""
+        rows: list[tuple[str, ...]] = [("", "mean", "median", "sum")]
+        if self._psnr:
+            rows.append(("PSNR [dB]", f"{fmean(self._psnr):.2f}", f"{median(self._psnr):.2f}", ""))
+        for name, values, scale in (("size [kB]", self._bytes, 1000), ("time [s]", self._seconds, 1)):
+            if values:
+                row = (function(values) / scale for function in (fmean, median, sum))
+                rows.append((name, *(f"{value:.1f}" for value in row)))
+        return rows if len(rows) > 1 else []
 
 
 def line(outcome: JobOutcome) -> str:

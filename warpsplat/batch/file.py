@@ -11,6 +11,7 @@ import yaml
 
 from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
+from warpsplat.run.names import ErrorAt
 
 MAX_FILE = 1 << 20
 """Largest batch file [bytes]: a mebibyte of YAML takes seconds to read."""
@@ -57,7 +58,7 @@ class BatchFile:
         """Return an error that names the file and the line."""
         return UsageError(f"{self.path}:{line}: {message}")
 
-    def error_at(self, line: int) -> Callable[[str], UsageError]:
+    def error_at(self, line: int) -> ErrorAt:
         """Return ``error`` for a line."""
         return partial(self.error, line)
 
@@ -128,17 +129,13 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
             if len(open_) > MAX_DEPTH:
                 raise error(line, f"nested deeper than {MAX_DEPTH} levels")
         elif isinstance(event, yaml.ScalarEvent):
-            size = sizes[anchor] = 1 + len(event.value) // CHARACTERS
+            size = sizes[anchor] = 1 + len(event.value) // 100  # long values count several times
             if len(event.value) > MAX_SCALAR:
                 raise error(line, f"a value of more than {MAX_SCALAR} characters")
         values += size
         if isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_.pop()
             sizes[anchor] = values - before
-
-
-CHARACTERS = 100
-"""Number of characters of a long value that count as one more value."""
 
 
 def plain(text: str) -> Any:

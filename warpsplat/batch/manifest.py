@@ -10,14 +10,13 @@ and key. Such a lock ends with its process, however that ends, and machines that
 
 from __future__ import annotations
 
-import contextlib
 import datetime
 import errno
 import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -30,11 +29,10 @@ try:
 except ImportError:  # Windows: two batches at once may both make an image
     fcntl = None  # type: ignore[assignment]
 
+LOCK, TRY_LOCK, UNLOCK = (fcntl.LOCK_EX, fcntl.LOCK_EX | fcntl.LOCK_NB, fcntl.LOCK_UN) if fcntl else (0, 0, 0)
+
 NAME = "warpsplat-manifest.jsonl"
 """Default name, in the folder of the results."""
-
-VERSION = 1
-"""Version of a line; later ones are not read."""
 
 MAX_LINE = 1 << 16
 """Longest line that is read [bytes]."""
@@ -43,7 +41,7 @@ MAX_FILE = 1 << 30
 """Largest manifest [bytes]: 100,000 images take 60 MB."""
 
 FIRST_LOCK = 1 << 40
-"""First of the bytes that stand for claims; there are as many."""
+"""First of the bytes that stand for claims; there are as many. It is itself the lock of the file's end."""
 
 Event = Literal["made", "failed", "writing"]
 """``writing``: the result is about to be written; by this, one without a mark is known to be ours."""
@@ -66,7 +64,7 @@ class Entry:
     def line(self) -> bytes:
         """Return the entry as a line of the file."""
         now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
-        values = {"v": VERSION, "time": now, **vars(self)}
+        values = {"v": 1, "time": now, **vars(self)}
         text = json.dumps({key: value for key, value in values.items() if value not in ("", {})})
         return text.encode() + b"\n"
 
@@ -77,7 +75,7 @@ def entry_of(line: bytes) -> Entry | None:
         return None
     try:
         values = json.loads(line)
-        if values["v"] != VERSION or values["event"] not in get_args(Event):
+        if values["v"] != 1 or values["event"] not in get_args(Event):
             return None
         texts = {name: values.get(name, "") for name in ("output", "key", "digest", "image", "error")}
         figures = {name: value for name, value in values.get("figures", {}).items() if _is_valid(name, value)}
@@ -89,16 +87,19 @@ def entry_of(line: bytes) -> Entry | None:
         return None
 
 
-def _is_valid(name: str, value: Any) -> bool:
-    """Return whether a figure is a number if sums are made of it or images sorted by it."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return name not in NUMBERS or (is_number and abs(value) < LARGE)
-
-
 NUMBERS = ("psnr", "bytes", "shapes", "seconds")
+"""Figures that sums are made of or images sorted by."""
 
-LARGE = 1e15
-"""Larger than all figures; excludes infinity, and integers of a million digits."""
+
+def _is_valid(name: str, value: Any) -> bool:
+    """Return whether a figure is a number, and no integer of a million digits, if it has to be."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return name not in NUMBERS or (is_number and abs(value) < 1e15)
+
+
+def digest(data: bytes) -> str:
+    """Return the SHA-256 of a result, hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
 
 
 class Manifest:
@@ -187,10 +188,13 @@ class Manifest:
         """
         assert self._handle is not None, "open"
         try:
-            with self._locked(0):
+            self._lock(LOCK)
+            try:
                 line = (b"" if self._ends_whole() else b"\n") + entry.line()
                 if os.write(self._handle, line) < len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            finally:
+                self._lock(UNLOCK)
         except OSError as error:
             raise OutputError(f"manifest {self.path}: could not be written: {error.strerror}") from error
 
@@ -203,18 +207,10 @@ class Manifest:
         os.lseek(self._handle, size - 1, os.SEEK_SET)
         return os.read(self._handle, 1) == b"\n"
 
-    @contextlib.contextmanager
-    def _locked(self, byte: int) -> Iterator[None]:
-        """Wait for the lock of a byte, and hold it during the block."""
-        if fcntl is None:
-            yield
-            return
-        assert self._handle is not None
-        fcntl.lockf(self._handle, fcntl.LOCK_EX, 1, FIRST_LOCK + byte)
-        try:
-            yield
-        finally:
-            fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, FIRST_LOCK + byte)
+    def _lock(self, operation: int, byte: int = FIRST_LOCK) -> None:
+        """Lock or unlock a byte: ``LOCK``, ``TRY_LOCK`` or ``UNLOCK``."""
+        if fcntl is not None and self._handle is not None:
+            fcntl.lockf(self._handle, operation, 1, byte)
 
     def claim(self, output: Path, key: str) -> bool:
         """Claim a result; return False if another process has.
@@ -222,11 +218,8 @@ class Manifest:
         Raises:
             OutputError: the file system has no locks.
         """
-        if fcntl is None:
-            return True
-        assert self._handle is not None, "open"
         try:
-            fcntl.lockf(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte(output, key))
+            self._lock(TRY_LOCK, self._byte(output, key))
         except (BlockingIOError, PermissionError):
             return False
         except OSError as error:
@@ -236,9 +229,8 @@ class Manifest:
 
     def release(self, output: Path, key: str) -> None:
         """Release a claim."""
-        if fcntl is not None and self._handle is not None:
-            fcntl.lockf(self._handle, fcntl.LOCK_UN, 1, self._byte(output, key))
+        self._lock(UNLOCK, self._byte(output, key))
 
     def _byte(self, output: Path, key: str) -> int:
-        digest = hashlib.sha256(f"{self.name(output)}\0{key}".encode()).digest()
-        return FIRST_LOCK + 1 + int.from_bytes(digest[:8], "big") % FIRST_LOCK
+        place = int(digest(f"{self.name(output)}\0{key}".encode())[:16], 16)
+        return FIRST_LOCK + 1 + place % FIRST_LOCK

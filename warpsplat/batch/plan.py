@@ -23,9 +23,9 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
@@ -70,10 +70,8 @@ class BatchJob:
     """Folder of all results of its output."""
 
 
-class _PlannedJob(NamedTuple):
-    request: ResultRequest
-    device: str
-    importance: Path | None
+PlannedJob = tuple[ResultRequest, BatchJob]
+"""A job without its output, and what that is named by."""
 
 
 def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[BatchJob]:
@@ -86,7 +84,7 @@ def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Batch
     Raises:
         UsageError: anything is wrong with them; the message names the line and key of a batch file.
     """
-    planned: list[_PlannedJob] = []
+    planned: list[PlannedJob] = []
     named: dict[Path, FoundImage] = {}
     for name in inputs:
         if name == str(STANDARD) or name.lower().endswith(BATCH_ENDINGS):
@@ -98,7 +96,7 @@ def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[Batch
     return _jobs(planned)
 
 
-def _jobs_of_file(path: Path, command: Layer) -> Iterator[_PlannedJob]:
+def _jobs_of_file(path: Path, command: Layer) -> Iterator[PlannedJob]:
     file = BatchFile(path)
     top = file.mapping(file.root, "a batch file", ("defaults", "presets", "jobs"))
     defaults: Layer = {}
@@ -158,7 +156,7 @@ def _images(file: BatchFile, line: int, node: yaml.Node) -> list[FoundImage]:
     return list(found.values())
 
 
-def _expanded(images: list[FoundImage], layers: Sequence[Layer], start: ErrorAt) -> Iterator[_PlannedJob]:
+def _expanded(images: list[FoundImage], layers: Sequence[Layer], start: ErrorAt) -> Iterator[PlannedJob]:
     """Yield the jobs of one description: each combination of its settings for each image."""
     for values in combinations(layers):
         given: dict[str, Any] = {key: item.value for key, item in values.items()}
@@ -178,7 +176,9 @@ def _expanded(images: list[FoundImage], layers: Sequence[Layer], start: ErrorAt)
         fields = fields_of(settings, {key: value for key, value in given.items() if key not in NESTED})
         device = given.get("device", "auto")
         for image in images:
-            yield _PlannedJob(ResultRequest(image, output, settings, fields, error_at), device, mask)
+            root = root_of(output) if output else image.root
+            job = BatchJob(image.path, Path(), settings, device, mask, root)
+            yield ResultRequest(image, output, settings, fields, error_at), job
 
 
 def _path(key: str, item: GivenValue) -> Path:
@@ -189,21 +189,11 @@ def _path(key: str, item: GivenValue) -> Path:
         raise item.error(f"{key}: {item.value!r}: {error}") from error
 
 
-def _jobs(planned: list[_PlannedJob]) -> list[BatchJob]:
-    requests = [item.request for item in planned]
-    outputs = name_results(requests, {item.importance for item in planned if item.importance})
+def _jobs(planned: list[PlannedJob]) -> list[BatchJob]:
+    requests = [request for request, _ in planned]
+    outputs = name_results(requests, {job.importance for _, job in planned if job.importance})
     check_outputs([request.error for request in requests], outputs)
-    return [
-        BatchJob(
-            request.image.path,
-            output,
-            request.settings,
-            device,
-            importance,
-            root_of(request.output) if request.output else request.image.root,
-        )
-        for (request, device, importance), output in zip(planned, outputs, strict=True)
-    ]
+    return [replace(job, output=output) for (_, job), output in zip(planned, outputs, strict=True)]
 
 
 def home_of(jobs: Sequence[BatchJob], inputs: Sequence[str]) -> Path:

@@ -19,14 +19,6 @@ from warpsplat.files.remote import is_remote
 
 log = logging.getLogger(__name__)
 
-INDEX_NAME = "index.html"
-"""Name of the list in a folder."""
-
-ENDINGS = (".html", ".htm")
-
-HEAD = 40_000
-"""Bytes at the start of a report that contain its thumbnail."""
-
 THUMBNAIL = re.compile(r'<meta name="thumbnail" content="(data:image/webp;base64,[\w+/=&#;]+)">')
 
 
@@ -49,7 +41,7 @@ class Reports:
             UsageError: the list cannot be written, or is one of these files.
             OutputError: the folder cannot be made.
         """
-        index = place if place.suffix.lower() in ENDINGS else place / INDEX_NAME
+        index = place if place.suffix.lower() in (".html", ".htm") else place / "index.html"
         if os.path.realpath(place) in {os.path.realpath(path) for path in taken if not is_remote(path)}:
             raise UsageError(f"{place}: is another file of this batch; give the report another name")
         if place != index and place.exists() and not place.is_dir():
@@ -58,20 +50,16 @@ class Reports:
         check_output(index, overwrite=overwrite)
         return Reports(index, home, overwrite)
 
-    @property
-    def folder(self) -> Path:
-        """Folder of the reports."""
-        return self.index.parent / f"{self.index.stem}-pages"
-
     def report_of(self, output: Path) -> Path:
         """Return the path of the report of a result."""
+        folder = self.index.parent / f"{self.index.stem}-pages"
         if not is_remote(output):
             with contextlib.suppress(ValueError):  # on another drive
                 inside = Path(os.path.relpath(output, self.home))
                 if ".." not in inside.parts:
-                    return self.folder / inside.parent / f"{inside.name}.html"
+                    return folder / inside.parent / f"{inside.name}.html"
         digest = hashlib.sha256(os.fsencode(str(output))).hexdigest()[:8]
-        return self.folder / f"{digest}-{output.name}.html"
+        return folder / f"{digest}-{output.name}.html"
 
     def link_back(self, output: Path) -> str:
         """Return the relative path from the report of a result to the list."""
@@ -104,7 +92,7 @@ class Reports:
         """Return the thumbnail in the report of a result as a data URI; empty if there is none."""
         try:
             with self.report_of(output).open("rb") as file:
-                found = THUMBNAIL.search(file.read(HEAD).decode("utf-8", "replace"))
+                found = THUMBNAIL.search(file.read(40_000).decode("utf-8", "replace"))
         except OSError:
             return ""
         return html.unescape(found[1]) if found else ""

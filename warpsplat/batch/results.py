@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from warpsplat.batch.executors.work import digest
-from warpsplat.batch.manifest import Entry, Manifest
+from warpsplat.batch.manifest import Entry, Manifest, digest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.files.inputs import MAX_INPUT
@@ -19,9 +18,6 @@ from warpsplat.files.output import may_replace
 from warpsplat.files.remote import exists, is_remote, listed, read_remote
 from warpsplat.svg.inspect import svg_text
 from warpsplat.svg.write import read_metadata
-
-TAIL = b"</svg>\n"
-"""End of every complete SVG."""
 
 MOST_NAMES = 20
 """Maximum number of files that one message names."""
@@ -72,7 +68,7 @@ def marked_key(data: bytes) -> str:
             data = svg_text(data, "").encode()
         except ImageError:
             return ""
-    if data.endswith(TAIL):
+    if data.endswith(b"</svg>\n"):
         return read_metadata(data[:HEAD].decode("utf-8", "replace"))
     return picture_key(data)
 

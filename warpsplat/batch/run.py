@@ -6,12 +6,12 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, Stop, Task
 from warpsplat.batch.executors.work import failure
-from warpsplat.batch.manifest import Entry, Event, Manifest
+from warpsplat.batch.manifest import Entry, Event, Manifest, digest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
 from warpsplat.batch.results import ResultState, read_result, result_state
@@ -50,22 +50,6 @@ class JobOutcome:
         return values | ({"error": self.error, "before": self.before} if self.error else {})
 
 
-class JobInputs(NamedTuple):
-    """A job's key and inputs."""
-
-    key: str
-    image: bytes
-    mask: bytes | None
-
-
-class Claim(NamedTuple):
-    """A job in progress."""
-
-    key: str
-    entry: Entry | None
-    """The manifest's entry of a result that exists and only lacks a report."""
-
-
 class Batch:
     """Runs jobs and keeps the manifest."""
 
@@ -90,7 +74,7 @@ class Batch:
         self.jobs, self.manifest = jobs, manifest
         self._on_outcome, self._retry, self._threads = on_outcome, retry, threads
         self._reports = reports
-        self._claims: dict[int, Claim] = {}
+        self._claimed: dict[int, Task] = {}
 
     def run(self, executor: Executor, stop: Stop, on_progress: OnProgress) -> None:
         """Do the jobs. Wait for those claimed by another process, and do them if it dies.
@@ -114,37 +98,38 @@ class Batch:
 
     def dry_run(self, stop: Stop) -> None:
         """Report what a run would do, and do nothing."""
-        for job in self.jobs:
+        for number, job in enumerate(self.jobs):
             if stop():
                 return
-            if self._inputs(job):
+            if self._task(number):
                 self._on_outcome(JobOutcome(job, "planned"))
 
     def _tasks(self, todo: list[int], later: list[int], stop: Stop) -> Iterator[Task]:
         """Claim the jobs ``todo`` and yield their tasks; append those claimed by others to ``later``."""
         for number in todo:
-            if stop():
-                return
             job = self.jobs[number]
-            inputs = self._inputs(job)
-            if inputs is None:
+            if stop() or (task := self._task(number)) is None:
                 continue
             if stop():
                 self._on_outcome(JobOutcome(job, "stopped"))
                 return
-            if not self.manifest.claim(job.output, inputs.key):
+            if not self.manifest.claim(job.output, task.key):
                 later.append(number)
                 continue
             self.manifest.refresh()  # the previous holder of the claim may have made it
-            state = self._state(job, inputs.key)
+            state = self._state(job, task.key)
             if state is None:
-                self.manifest.release(job.output, inputs.key)
+                self.manifest.release(job.output, task.key)
                 continue
-            self._claims[number] = Claim(inputs.key, state.entry if state.made else None)
-            yield self._task(number, inputs, measure=state.made)
+            if state.made:
+                figures = state.entry.figures if state.entry else {}
+                task = replace(task, result=read_result(job.output), figures=figures)
+            self._claimed[number] = task
+            yield task
 
-    def _inputs(self, job: BatchJob) -> JobInputs | None:
-        """Return a job's inputs; None, after its outcome, if nothing is to be done."""
+    def _task(self, number: int) -> Task | None:
+        """Return the task of a job, to make the result; None, after its outcome, if nothing is to be done."""
+        job = self.jobs[number]
         try:
             image = read_input(job.image)
             mask = read_input(job.importance) if job.importance else None
@@ -153,7 +138,21 @@ class Batch:
             message = failure(error, str(job.image), str(job.output))
             self._on_outcome(JobOutcome(job, "failed", error=message))
             return None
-        return JobInputs(key, image, mask) if self._state(job, key) else None
+        if self._state(job, key) is None:
+            return None
+        return Task(
+            number,
+            key,
+            image,
+            str(job.image),
+            str(job.output),
+            job.settings,
+            job.device,
+            self._threads,
+            mask,
+            str(job.importance),
+            report_back=self._reports.link_back(job.output) if self._reports else "",
+        )
 
     def _state(self, job: BatchJob, key: str) -> ResultState | None:
         """Return the state of a result; None, after the job's outcome, if nothing is to be done."""
@@ -168,38 +167,18 @@ class Batch:
             return None
         return state
 
-    def _task(self, number: int, inputs: JobInputs, *, measure: bool) -> Task:
-        job, entry = self.jobs[number], self._claims[number].entry
-        return Task(
-            number,
-            inputs.key,
-            inputs.image,
-            str(job.image),
-            str(job.output),
-            job.settings,
-            job.device,
-            self._threads,
-            inputs.mask,
-            str(job.importance),
-            # A result without a key in it is known by its digest, which is noted before it is written; a
-            # picture is drawn once, for both.
-            bring=is_remote(job.output) or job.settings.minify or is_picture(job.output),
-            result=read_result(job.output) if measure else None,
-            report_back=self._reports.link_back(job.output) if self._reports else "",
-            figures=entry.figures if entry else {},
-        )
-
     def _settle(self, outcome: Outcome) -> None:
-        """Write a result if the worker did not; add the outcome to the manifest and report it."""
-        job, (key, before) = self.jobs[outcome.number], self._claims.pop(outcome.number)
+        """Write a result, add the outcome to the manifest, and report it."""
+        job, task = self.jobs[outcome.number], self._claimed.pop(outcome.number)
         status: Status = "skipped" if outcome.status == "measured" else outcome.status
         error = outcome.error
         try:
-            if outcome.data is not None:
-                self._note(job, outcome, "writing")
+            if outcome.data is not None and outcome.status != "measured":
+                if job.settings.minify or is_picture(job.output) or is_remote(job.output):
+                    self._note(job, outcome, "writing")  # known by its digest, if this process ends now
                 make_folder(job.output.parent)
                 write_result(job.output, outcome.data)
-            if outcome.status in ("made", "measured") and not before:
+            if outcome.status in ("made", "measured") and not task.figures:
                 self._note(job, outcome, "made")
         except OutputError as failed:
             status, error = "failed", failure(failed, str(job.image), str(job.output))
@@ -208,11 +187,12 @@ class Batch:
                 self._note(job, Outcome(outcome.number, "failed", outcome.key), "failed", error)
         if self._reports and status != "failed":
             self._reports.keep(job.output, outcome)
-        self.manifest.release(job.output, key)
-        self._on_outcome(JobOutcome(job, status, before.figures if before else outcome.figures, error))
+        self.manifest.release(job.output, task.key)
+        self._on_outcome(JobOutcome(job, status, task.figures or outcome.figures, error))
 
     def _note(self, job: BatchJob, outcome: Outcome, event: Event, error: str = "") -> None:
         """Append an entry to the manifest; a stopped result is ours, but not the job's."""
         key = STOPPED if outcome.status == "stopped" else outcome.key
         name, image = self.manifest.name(job.output), str(job.image)
-        self.manifest.append(Entry(name, key, event, outcome.digest, image, error, outcome.figures))
+        made = "" if outcome.data is None else digest(outcome.data)
+        self.manifest.append(Entry(name, key, event, made, image, error, outcome.figures))

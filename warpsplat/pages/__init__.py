@@ -2,7 +2,3 @@
 
 Nothing here computes results: pages get texts, numbers and data URIs.
 """
-
-from warpsplat.pages.environment import MARK, page
-
-__all__ = ["MARK", "page"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 from urllib.parse import quote
@@ -28,23 +29,16 @@ def page(template: str, *, assets: tuple[str, ...] = (), connects: bool = False,
         values: variables of the template. Texts are escaped; ``|tojson`` makes data for scripts.
     """
     texts = {name: asset(name) for name in ("base.css", "base.js", *assets)}
-    scripts = [text for name, text in texts.items() if name.endswith(".js")]
-    text = (
-        environment()
-        .get_template(template)
-        .render(
-            policy=policy(scripts, connects=connects),
-            styles=[Markup(text) for name, text in texts.items() if name.endswith(".css")],
-            scripts=[Markup(script) for script in scripts],
-            version=__version__,
-            **values,
-        )
-    )
+    scripts = [Markup(text) for name, text in texts.items() if name.endswith(".js")]
+    styles = [Markup(text) for name, text in texts.items() if name.endswith(".css")]
+    rules = policy(scripts, connects=connects)
+    made = environment().get_template(template)
+    text = made.render(policy=rules, styles=styles, scripts=scripts, version=__version__, **values)
     # Names that the system could not decode have surrogates, which no file can hold.
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def policy(scripts: list[str], *, connects: bool = False) -> str:
+def policy(scripts: Sequence[str], *, connects: bool) -> str:
     """Return a content security policy that runs these scripts only, and loads nothing from elsewhere.
 
     Even if a text got into a page as markup, despite the escaping, it could do nothing.

@@ -15,8 +15,6 @@ from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output
 
-ENDINGS = (".html", ".htm")
-
 
 class ReportHook(RunHook):
     """Writes a page on one result, or one that compares several numbers of shapes."""
@@ -49,7 +47,7 @@ class ReportHook(RunHook):
         taken = {os.path.realpath(path) for path in outputs if path != STANDARD}
         if os.path.realpath(self._page) in taken:
             raise UsageError(f"{self._page}: is the result; give the report another name")
-        check_output(self._page, *inputs, endings=ENDINGS, overwrite=overwrite)
+        check_output(self._page, *inputs, endings=(".html", ".htm"), overwrite=overwrite)
 
     def needs_image(self) -> bool:
         """See ``RunHook``."""
@@ -67,14 +65,13 @@ class ReportHook(RunHook):
         from warpsplat.pages.report import report
 
         ((output, result),) = done.made
-        stem = Path(name if output == STANDARD else output.name).stem
         report(
             result,
             done.data,
             self._page,
             command=done.command,
             name=name,
-            svg_name=f"{stem}.svg",
+            svg_name=f"{Path(name if output == STANDARD else output.name).stem}.svg",
             device=done.request.device,
             threads=done.request.threads,
         )

@@ -14,9 +14,6 @@ WIDTH, HEIGHT = 420, 190
 LEFT, TOP, RIGHT, BOTTOM = 42, 10, 410, 156
 """Box of the curve, inside the space for the axes."""
 
-MOST_POINTS = 400
-"""Most points of a curve: more cannot be told apart."""
-
 
 class Mark(NamedTuple):
     """A labelled dot on a curve."""
@@ -57,7 +54,7 @@ def plot(
     filled: bool = False,
     marks: Sequence[Mark] = (),
 ) -> Plot | None:
-    """Lay out a curve.
+    """Lay out a curve; return None if fewer than two points are finite.
 
     Args:
         title: title of the plot.
@@ -67,16 +64,13 @@ def plot(
         faint: which points are drawn faint, as they cannot be compared with the others.
         filled: whether the vertical axis begins at 0, and the area below the curve is filled.
         marks: points of the curve to be marked.
-
-    Returns:
-        The plot; None if fewer than two points are finite.
     """
     flags = list(faint) or [False] * len(xs)
     found = [p for p in zip(xs, ys, flags, strict=True) if math.isfinite(p[0]) and math.isfinite(p[1])]
     if len(found) < 2 or found[-1][0] <= found[0][0]:
         return None
-    step = max(1.0, (len(found) - 1) / (MOST_POINTS - 1))
-    found = [found[round(i * step)] for i in range(min(len(found), MOST_POINTS))]
+    step = max(1.0, (len(found) - 1) / 399)  # more than 400 points cannot be told apart
+    found = [found[round(i * step)] for i in range(min(len(found), 400))]
     low, high, end = min(p[1] for p in found), max(p[1] for p in found), found[-1][0]
     up, across = ticks(0.0 if filled else low, high, 5), ticks(0.0, end, 6)
     low, high = min(low, up[0]), max(high, up[-1])

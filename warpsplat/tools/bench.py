@@ -25,22 +25,11 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.run.options import KINDS
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 
-STAGES = ("outline", "bins", "forward", "loss", "backward", "update")
-
 WARM_UP = 3
 """Steps that are not counted."""
 
-RADIUS = (0.05, 0.1)
-"""Range of the shapes' radii over the width of the canvas; half of that on canvases of over 2000 px."""
-
-STROKE_WIDTH = 3.0
-"""[px]"""
-
 JITTER = 0.2
 """Standard deviation of the control points' distance from the centre, over the radius."""
-
-TARGET_BLUR = 8.0
-"""Standard deviation of the blur of the random target image [px]."""
 
 
 def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, seed: int) -> Scene:
@@ -48,30 +37,29 @@ def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, s
     kind, (width, height) = KINDS[name], size
     rng = np.random.default_rng(seed)
     centres = rng.uniform(0, [width, height], (curves, 2))
-    radii = width * rng.uniform(*RADIUS, curves) * (0.5 if width > 2000 else 1.0)
+    radii = width * rng.uniform(0.05, 0.1, curves) * (0.5 if width > 2000 else 1.0)
     if kind == Kind.FILL:
         circles = circle_outlines(np.zeros((curves, 2)), np.ones(curves), 2)
         offsets = circles * (1 + JITTER * rng.normal(size=(curves, circles.shape[1], 1)))
     else:
         angle = rng.uniform(0, np.pi, curves)
         along = np.linspace(-1, 1, 3 * STROKE_CUBICS + 1)
-        direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        offsets = along[None, :, None] * direction[:, None]
-        offsets = offsets + JITTER * rng.normal(size=(curves, len(along), 2))
+        lines = along[None, :, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None]
+        offsets = lines + JITTER * rng.normal(size=lines.shape)
     return Scene.uniform(
         kind,
         Canvas(width, height, np.zeros(3, np.float32)),
         np.asarray(centres[:, None] + radii[:, None, None] * offsets, np.float32),
         colors=rng.uniform(0, 1, (curves, 3)).astype(np.float32),
         opacities=np.full(curves, opacity, np.float32),
-        widths=np.full(curves, 0.0 if kind == Kind.FILL else STROKE_WIDTH, np.float32),
+        widths=np.full(curves, 0.0 if kind == Kind.FILL else 3.0, np.float32),
     )
 
 
 def bench_target(width: int, height: int, seed: int) -> FloatArray:
     """Return smooth noise: sRGB in [0, 1], shape (height, width, 3)."""
     noise = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)).astype(np.float32)
-    return np.asarray(cv2.GaussianBlur(noise, (0, 0), TARGET_BLUR), np.float32)
+    return np.asarray(cv2.GaussianBlur(noise, (0, 0), 8.0), np.float32)
 
 
 def peak_memory(device: wp.Device) -> int | None:
@@ -93,9 +81,6 @@ def bench(
 
     Returns:
         results of ``time_steps``, counts, memory and, with ``through_torch``, results of ``time_torch``.
-
-    Raises:
-        UsageError: PyTorch is needed and not installed.
     """
     curves, width, height = len(scene), scene.canvas.width, scene.canvas.height
     settings = Settings(
@@ -163,7 +148,10 @@ def time_steps(step: Step, repeats: int) -> dict[str, Any]:
                 sums[key] += value
         launches.append(sums)
     launches = launches[WARM_UP:]
-    stages = {name: [sum(v for k, v in one.items() if k[0] == name) for one in launches] for name in STAGES}
+    stages = {
+        name: [sum(v for k, v in one.items() if k[0] == name) for one in launches]
+        for name in dict.fromkeys(stage for stage, _ in launches[0])
+    }
     return {
         "step": summary(steps[WARM_UP:]),
         "forward_backward": summary(passes[WARM_UP:]),

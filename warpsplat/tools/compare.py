@@ -65,13 +65,6 @@ class Comparison:
     """Ours, apart from the number of shapes."""
     tracer: Tracer
 
-    def by_image(self) -> dict[str, list[ComparisonRow]]:
-        """Return the rows of each image."""
-        found: dict[str, list[ComparisonRow]] = {}
-        for row in self.rows:
-            found.setdefault(row.image, []).append(row)
-        return found
-
     def as_dict(self) -> dict[str, Any]:
         """Return values for JSON."""
         ours = {
@@ -115,11 +108,7 @@ def stopwatch() -> Callable[[], tuple[float, float]]:
 
 
 def our_row(image: str, target: FloatArray, settings: Settings, make: Maker) -> ComparisonRow:
-    """Return our file of at most ``settings.curves`` shapes.
-
-    Raises:
-        Stopped: the run was interrupted.
-    """
+    """Return our file of at most ``settings.curves`` shapes; raise ``Stopped`` if the run was interrupted."""
     times: list[tuple[float, float]] = []
     elapsed = stopwatch()
     result = make(target, settings, lambda _: times.append(elapsed()))

@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
+from statistics import fmean
 
 from warpsplat._version import __version__
 from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
-from warpsplat.tools.tracer import TracerOptions
 
 Figures = dict[str, float | None]
 """Figures of a row, or means; None if unknown."""
 
 
-def _decimals(count: int, per: float = 1.0) -> Callable[[float], str]:
-    return lambda value: f"{value / per:.{count}f}"
-
-
-def _decibels(value: float) -> str:
-    return f"{value:.2f}" if math.isfinite(value) else "exact"
-
-
-COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
-    "psnr": ("PSNR [dB]", _decibels),
-    "ssim": ("SSIM", _decimals(3)),
-    "ssimulacra2": ("SSIMULACRA2", _decimals(1)),
-    "bytes": ("kB", _decimals(1, 1000)),
-    "gzip_bytes": ("kB gzipped", _decimals(1, 1000)),
-    "paths": ("paths", _decimals(0)),
-    "nodes": ("nodes", _decimals(0)),
-    "seconds": ("s", _decimals(1)),
-    "cpu_seconds": ("CPU s", _decimals(1)),
+COLUMNS = {
+    "psnr": ("PSNR [dB]", 1, ".2f"),
+    "ssim": ("SSIM", 1, ".3f"),
+    "ssimulacra2": ("SSIMULACRA2", 1, ".1f"),
+    "bytes": ("kB", 1000, ".1f"),
+    "gzip_bytes": ("kB gzipped", 1000, ".1f"),
+    "paths": ("paths", 1, ".0f"),
+    "nodes": ("nodes", 1, ".0f"),
+    "seconds": ("s", 1, ".1f"),
+    "cpu_seconds": ("CPU s", 1, ".1f"),
 }
-"""Figures of a table: heading, and how a value is written."""
+"""Figures of a table: heading, unit, format."""
+
+
+def _written(name: str, value: float | None) -> str:
+    _, unit, form = COLUMNS[name]
+    return "-" if value is None else format(value / unit, form) if math.isfinite(value) else "exact"
 
 
 def figures(row: ComparisonRow) -> Figures:
@@ -45,21 +42,20 @@ def figures(row: ComparisonRow) -> Figures:
 
 def means(found: Comparison) -> list[tuple[str, str, Figures]]:
     """Return program, setting and mean figures of the settings that succeeded on every image."""
-    count = len(found.by_image())
+    count = len({row.image for row in found.rows})
     groups: dict[tuple[str, str], list[Figures]] = {}
     for row in found.rows:
         groups.setdefault((row.program, row.setting), []).append(figures(row))
-    entries = []
-    for names, group in groups.items():
-        if len(group) == count and all(group):
-            columns = {name: [values[name] for values in group] for name in COLUMNS}
-            entries.append((*names, {name: _mean(values) for name, values in columns.items()}))
-    return entries
+    return [
+        (*names, {name: _mean([values[name] for values in group]) for name in COLUMNS})
+        for names, group in groups.items()
+        if len(group) == count and all(group)
+    ]
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
-    return sum(known) / len(known) if len(known) == len(values) else None
+    return fmean(known) if len(known) == len(values) else None
 
 
 def table(entries: Sequence[tuple[str, str, Figures]]) -> str:
@@ -67,25 +63,19 @@ def table(entries: Sequence[tuple[str, str, Figures]]) -> str:
     shown = [name for name in COLUMNS if any(values.get(name) is not None for *_, values in entries)]
     cells = [["program", "setting", *(COLUMNS[name][0] for name in shown)]]
     for program, setting, values in entries:
-        numbers = [(values.get(name), COLUMNS[name][1]) for name in shown]
-        cells.append([program, setting, *("-" if v is None else write(v) for v, write in numbers)])
+        cells.append([program, setting, *(_written(name, values.get(name)) for name in shown)])
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    rule = ["-" * w if i < 2 else "-" * (w - 1) + ":" for i, w in enumerate(widths)]
-    return "\n".join(_line(line, widths) for line in (cells[0], rule, *cells[1:]))
-
-
-def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    """Return a line of a table: two columns of words, then numbers."""
-    words = map(str.ljust, cells[:2], widths[:2])
-    numbers = map(str.rjust, cells[2:], widths[2:])
-    return f"| {' | '.join([*words, *numbers])} |"
+    cells.insert(1, ["-" * w if i < 2 else "-" * (w - 1) + ":" for i, w in enumerate(widths)])
+    aligned = [[*map(str.ljust, line[:2], widths), *map(str.rjust, line[2:], widths[2:])] for line in cells]
+    return "\n".join(f"| {' | '.join(line)} |" for line in aligned)
 
 
 def markdown(found: Comparison) -> str:
     """Return all tables: each image, the means of several, and the meaning of settings."""
     parts = []
-    images = found.by_image()
-    for image, rows in images.items():
+    images = dict.fromkeys(row.image for row in found.rows)
+    for image in images:
+        rows = [row for row in found.rows if row.image == image]
         parts += [f"## {image}", table([(row.program, row.setting, figures(row)) for row in rows])]
         parts += [f"{row.program}, {row.setting}: {row.error}" for row in rows if row.error]
     if len(images) > 1:
@@ -95,11 +85,8 @@ def markdown(found: Comparison) -> str:
         f"* {OURS} {__version__}: the number of {ours.kind.name.lower()}s; {ours.iterations} steps, "
         f"seed {ours.seed}",
         f"* {tracer.name} {tracer.version}, options other than the defaults:",
-        *(f"  * {name}: {options_text(options)}" for name, options in tracer.settings.items()),
     ]
+    for name, options in tracer.settings.items():
+        text = ", ".join(f"{key} {value}" for key, value in options.items())
+        lines.append(f"  * {name}: {text or 'none'}")
     return "\n\n".join([*parts, "## Settings", "\n".join(lines)])
-
-
-def options_text(options: TracerOptions) -> str:
-    """Return a tracer's options as text."""
-    return ", ".join(f"{name} {value}" for name, value in options.items()) or "none"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import platform
-import re
 import sys
 import tempfile
 import time
@@ -17,14 +16,17 @@ from typing import Any, Literal
 from warpsplat._version import __version__
 from warpsplat.errors import explain
 
-MODULES = {
-    "warp-lang": "warp",
+PACKAGES = {
+    "click": "click",
+    "jinja2": "jinja2",
+    "numpy": "numpy",
     "opencv-contrib-python-headless": "cv2",
     "pillow": "PIL",
     "pyyaml": "yaml",
     "resvg-py": "resvg_py",
+    "warp-lang": "warp",
 }
-"""Package -> module, if the names differ."""
+"""Required packages and their modules."""
 
 EXTRAS = {
     "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
@@ -98,16 +100,6 @@ def check_python() -> Check:
     return Check(text, values)
 
 
-def required_packages() -> list[str]:
-    """Return the packages that warpsplat requires."""
-    try:
-        requires = importlib.metadata.requires("warpsplat") or []
-    except importlib.metadata.PackageNotFoundError:  # a checkout that was not installed
-        requires = ["warp-lang", "numpy", "opencv-contrib-python-headless", "pillow", "click", "resvg-py"]
-    names = (re.match(r"[\w.-]+", line) for line in requires if "extra ==" not in line)
-    return sorted(name[0].lower() for name in names if name)
-
-
 def version_of(package: str) -> str | None:
     """Return the version of an installed package, or None."""
     try:
@@ -120,9 +112,9 @@ def check_packages() -> Check:
     """Check that each required package can be imported."""
     versions: dict[str, str] = {}
     broken: list[str] = []
-    for package in required_packages():
+    for package, name in PACKAGES.items():
         try:
-            module = importlib.import_module(MODULES.get(package, package))
+            module = importlib.import_module(name)
             versions[package] = version_of(package) or str(getattr(module, "__version__", "?"))
         except BaseException as error:  # native libraries fail in their own ways
             cause = explain(error)[0].removeprefix("internal error: ").split(" (set ")[0]
@@ -139,10 +131,11 @@ def check_extras() -> Check:
     found = {extra: version_of(package) for extra, (package, _) in EXTRAS.items()}
     installed = [f"{extra} ({EXTRAS[extra][0]} {version})" for extra, version in found.items() if version]
     missing = [f"{extra} (for {EXTRAS[extra][1]})" for extra, version in found.items() if not version]
-    parts = [", ".join(installed)] * bool(installed) + ["not installed: " + ", ".join(missing)] * bool(
-        missing
-    )
-    return Check("; ".join(parts), {"versions": found}, "note" if missing else "ok")
+    text = ", ".join(installed)
+    if not missing:
+        return Check(text, {"versions": found})
+    text += "; " * bool(installed) + "not installed: " + ", ".join(missing)
+    return Check(text, {"versions": found}, "note")
 
 
 def check_devices() -> Check:
@@ -254,9 +247,6 @@ def check_run(device: str) -> Check:
 MAX_DIFFERENCE = 0.02
 """Relative, between a derivative and the difference quotient in single precision."""
 
-STEP = 0.01
-"""Step of the difference quotient [px]."""
-
 
 def check_adjoint(device: str) -> Check:
     """Check a derivative of an image against the difference quotient."""
@@ -285,7 +275,8 @@ def check_adjoint(device: str) -> Check:
         renderer.forward_complete()
         return float((renderer.read_image() * weights).sum(dtype="float64"))
 
-    quotient = (weighted_sum(STEP) - weighted_sum(-STEP)) / (2 * STEP)
+    step = 0.01  # [px]
+    quotient = (weighted_sum(step) - weighted_sum(-step)) / (2 * step)
     difference = abs(derivative - quotient) / max(abs(quotient), 1e-9)
     text = f"derivative and difference quotient of an image differ by {100 * difference:.2f} %"
     if not difference <= MAX_DIFFERENCE:

@@ -2,15 +2,14 @@
 
 from warpsplat.extensions import Command, Extension
 
+FOLDER = "warpsplat.tools.commands"
+
 EXTENSION = Extension(
     commands={
-        name: Command(text, f"warpsplat.tools.commands.{name}:command")
-        for name, text in {
-            "compare": "Compare our files with another program's.",
-            "bench": "Time the stages of a training step.",
-            "info": "Show version and devices.",
-            "doctor": "Check that everything a run needs works.",
-        }.items()
+        "compare": Command("Compare our files with another program's.", f"{FOLDER}.compare:command"),
+        "bench": Command("Time the stages of a training step.", f"{FOLDER}.bench:command"),
+        "info": Command("Show version and devices.", f"{FOLDER}.doctor:info"),
+        "doctor": Command("Check that everything a run needs works.", f"{FOLDER}.doctor:command"),
     },
     uses=("torch",),
 )

@@ -29,7 +29,7 @@ def tasks(folder: Path) -> Iterator[Task]:
     for i in range(4):
         path = folder / f"{i}.png"
         Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        yield Task(i, "key", path.read_bytes(), path.name, f"{i}.svg", settings, "cpu", 1, bring=True)
+        yield Task(i, "key", path.read_bytes(), path.name, f"{i}.svg", settings, "cpu", 1)
 
 
 def results(executor: Executor, folder: Path) -> dict[int, bytes | None]:

@@ -10,7 +10,7 @@ import pytest
 
 import warpsplat
 from tests.pages.browser.conftest import Complaints, fits_a_phone, opened, wait_until
-from tests.pages.serve.helpers import Visitor, picture, until
+from tests.pages.serve.helpers import Visitor, held, picture, until
 from warpsplat.fit.settings import PRESETS
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def test_a_run_is_live_survives_a_reload_and_can_be_stopped(visit: Page, visitor
     assert 1 <= len(warpsplat.load_svg(svg)) <= 9
     session = page.evaluate("location.hash").partition("=")[2]
     page.close()
-    until(lambda: visitor.store.held()["sessions"] and not visitor.store.is_attended(session))
+    until(lambda: held(visitor.store)["sessions"] and not visitor.store.is_attended(session))
 
 
 def test_refusals_are_shown_where_they_belong(visit: Page, complaints: Complaints) -> None:

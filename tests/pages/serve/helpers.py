@@ -12,11 +12,11 @@ import httpx
 import numpy as np
 from PIL import Image
 
-from warpsplat.pages.serve.limits import Limits
 from warpsplat.pages.serve.server import WarpsplatServer
+from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
 
-CPU = Machine("cpu", 1)
 LONGEST = 60.0
 """Longest wait for anything [s]."""
 
@@ -40,11 +40,23 @@ def until(condition: Any) -> Any:
     return found
 
 
+def held(store: Store) -> dict[str, int]:
+    """Return the numbers of sessions and runs, and the sizes of images and results [bytes]."""
+    return {
+        "sessions": len(store._sessions),
+        "runs": len([*store._all_runs()]),
+        "waiting": len(store._queue),
+        "images": store._image_bytes(),
+        "results": store._result_bytes(),
+        "uploading": store._uploading,
+    }
+
+
 class Visitor:
     """A page's requests to a server, which it starts; a context manager."""
 
     def __init__(self, limits: Limits | None = None, max_memory: str | None = None) -> None:
-        self.server = WarpsplatServer("127.0.0.1", 0, machine=CPU, limits=limits, max_memory=max_memory)
+        self.server = WarpsplatServer("127.0.0.1", 0, Machine("cpu", 1, max_memory), limits or Limits())
         self.store = self.server.store
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.server.port}", timeout=LONGEST)
         self._ends, begun = threading.Event(), threading.Event()

@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.pages.serve.helpers import Visitor, picture, until
+from tests.pages.serve.helpers import Visitor, held, picture, until
 from warpsplat.fit.settings import make_settings
-from warpsplat.pages.serve.limits import Limits
+from warpsplat.pages.serve.sessions import Limits
 from warpsplat.rendering.parameters import Parameters
 
 SHORT = {"curves": 4, "subject": "photo"}
@@ -134,7 +134,7 @@ def test_an_invalid_upload(data: bytes, status: int, said: str) -> None:
     with Visitor(Limits(upload=2_000_000)) as visitor:
         answer = visitor.client.post(visitor.at("images?name=photo.png"), content=data)
         assert answer.status_code == status and one_line(answer.text).startswith(said)
-        assert visitor.store.held()["uploading"] == visitor.store.held()["images"] == 0
+        assert held(visitor.store)["uploading"] == held(visitor.store)["images"] == 0
 
 
 def test_requests_of_unknown_or_excessive_size(visitor: Visitor) -> None:

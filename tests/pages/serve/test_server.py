@@ -17,6 +17,8 @@ import warpsplat.pages.serve.server as server_module
 from tests.cli.helpers import one_line, run
 from tests.pages.serve.helpers import Visitor, picture, until
 from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
+from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.worker import Machine
 
 
 def states(visitor: Visitor) -> Any:
@@ -114,7 +116,7 @@ def test_a_host_that_other_machines_reach_prints_a_warning(
 
 
 def test_addresses() -> None:
-    server = WarpsplatServer("::1", 0)
+    server = WarpsplatServer("::1", 0, Machine(), Limits())
     assert server.address().startswith(f"http://[::1]:{server.port}/?token=")
     assert server.ticket() != server.address()
     server.close()

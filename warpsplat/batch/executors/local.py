@@ -14,7 +14,7 @@ WORTHWHILE = 400_000
 """Shapes times steps of a batch from which processes save more than the seconds that they take to start."""
 
 MEMORY = 1 << 30
-"""Memory per process if their number is not given [bytes]: for an image of 10 million pixels."""
+"""Memory per process [bytes]: for an image of 10 million pixels."""
 
 
 def split_cores(
@@ -48,7 +48,7 @@ class Serial(Executor):
     def __init__(
         self, around: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext
     ) -> None:
-        """``around`` returns a context manager in which each task is done."""
+        """``around``: returns a context manager for each task."""
         self._around = around
 
     def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:

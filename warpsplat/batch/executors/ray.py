@@ -1,8 +1,7 @@
 """Do tasks on a Ray cluster; an extra, ``pip install "warpsplat[ray]"``.
 
 Workers are actors: processes that the cluster starts where it has capacity. They are kept, so that each
-starts Warp and loads kernels once. They write no files but return all results, so that a worker which the
-cluster has given up, but which is still running somewhere, can replace nothing.
+starts Warp and loads kernels once.
 """
 
 from __future__ import annotations
@@ -11,20 +10,17 @@ import contextlib
 import logging
 import math
 import time
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from types import ModuleType
 
 from warpsplat._version import __version__
 from warpsplat.batch.executors.ray_connection import connected, ray_cause
 from warpsplat.batch.executors.ray_worker import RayWorker, TaskResources
-from warpsplat.batch.executors.tasks import Executor, OnProgress, Outcome, Stop, Task
-from warpsplat.errors import ResourceError, UsageError, printable
+from warpsplat.batch.executors.tasks import OnProgress, Outcome, Task
+from warpsplat.batch.executors.workers import WorkerExecutor
+from warpsplat.errors import UsageError, printable
 
 log = logging.getLogger("warpsplat")
-
-GRACE = 10.0
-"""Seconds that tasks have to end after they are asked to stop: for a step, and returning the file."""
 
 POLL = 0.2
 """Seconds between two calls of ``stop``."""
@@ -35,15 +31,12 @@ PAUSE = 1.0
 PATIENCE = 20.0
 """Seconds without any worker before a warning."""
 
-TRIES = 3
-"""Tries of a task whose worker is lost. Nodes of clusters go for many reasons: it need not be the image."""
 
-MOST_STILLBORN = 3
-"""After so many workers in a row that are lost before they answer, no more are started."""
+class RayCluster(WorkerExecutor[RayWorker]):
+    """Does tasks on a cluster."""
 
-
-class RayCluster(Executor):
-    """Does tasks on a cluster; every result is returned, also of tasks without ``bring``."""
+    tries = 3  # nodes of clusters go for many reasons: it need not be the image
+    stillborn = "workers of the Ray cluster end as soon as they begin"
 
     def __init__(self, address: str = "", *, workers: int | None = None, gpus: float = 1.0) -> None:
         """Nothing is connected to before there is a task.
@@ -62,69 +55,44 @@ class RayCluster(Executor):
             import ray
         except ImportError as error:
             raise UsageError(f'--executor ray: {error}; pip install "warpsplat[ray]" installs it') from error
+        super().__init__()
         self._ray: ModuleType = ray
         self._address, self._most, self._gpus = address, workers, gpus
-        self._connection: contextlib.ExitStack | None = None
-        self._workers: list[RayWorker] = []
-        self.workers = workers or 1
-        self._answered = 0
-        """Most workers that there were."""
-        self._stillborn = 0
-        self._tries: Counter[int] = Counter()
-        self._waiting: Iterator[Task] | None = None
-        """Tasks that were not taken yet; None: all were."""
-        self._again: list[Task] = []
-        self.lost = 0
-        """Workers that were lost with a task."""
+        self._connection = contextlib.ExitStack()
+        self._asked = self._begun = 0.0
+        """Times of the last questions to workers, and of the first search for one [s]; 0: not yet."""
 
     def close(self) -> None:
         """See ``Executor``. A cluster that was there before stays."""
-        self._remove(self._workers)
-        if self._connection:
-            self._connection.close()
-            self._connection = None
-
-    def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:
-        """See ``Executor``."""
-        self._waiting, self._again = iter(tasks), []
-        self._tries.clear()
-        begun = asked = time.monotonic()
-        while not stop():
-            self._give()
-            if not self._waiting and not self._again and not self._busy():
-                return
-            now = time.monotonic()
-            if now - asked > PAUSE:
-                asked = now
-                for worker in self._busy():
-                    worker.ask_progress()
-                self._hire()
-            if now - begun > PATIENCE:
-                self._warn_of_waiting()
-                begun = math.inf
-            yield from self._receive(on_progress)
-        yield from self._stop_tasks(on_progress)
-
-    def _busy(self) -> list[RayWorker]:
-        return [worker for worker in self._workers if worker.task]
+        super().close()
+        self._connection.close()
 
     def _give(self) -> None:
-        """Hand tasks to idle workers; at most one more is taken, for a worker that is starting."""
-        while self._again or not self._workers or any(worker.idle for worker in self._workers):
-            task = self._again.pop() if self._again else next(self._waiting or iter(()), None)
-            if task is None:
-                self._waiting = None
-                return
-            if self._connection is None:
-                self._connection = contextlib.ExitStack()
-                self._connection.enter_context(connected(self._ray, self._address))
-            needed = self._resources(task)
-            worker = next((w for w in self._workers if w.idle and w.resources == needed), None)
-            if worker is None:
-                self._again.append(task)
-                self._hire()
-                return
-            worker.give(task)
+        """Hand out tasks; now and then, ask for progress, and look for more capacity."""
+        super()._give()
+        now = time.monotonic()
+        self._begun = self._begun or now
+        if now - self._asked > PAUSE:
+            self._asked = now
+            for worker in self._busy():
+                worker.ask_progress()
+            self._hire()
+        if now - self._begun > PATIENCE:
+            self._begun = math.inf
+            self._warn_of_waiting()
+
+    def _has_place(self) -> bool:
+        """See ``WorkerExecutor``: at most one more is taken, for a worker that is starting."""
+        return not self._workers or any(worker.idle for worker in self._workers)
+
+    def _worker_for(self, task: Task) -> RayWorker | None:
+        if not self._ray.is_initialized():
+            self._connection.enter_context(connected(self._ray, self._address))
+        needed = self._resources(task)
+        found = next((w for w in self._workers if w.idle and w.resources == needed), None)
+        if found is None:
+            self._hire(needed)
+        return found
 
     def _resources(self, task: Task) -> TaskResources:
         """Return what a task takes: GPUs if it asks for one, or leaves it open and the cluster has any."""
@@ -135,25 +103,24 @@ class RayCluster(Executor):
         """Return the resources of each node that is alive."""
         return [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
 
-    def _hire(self) -> None:
-        """Start as many workers as the cluster has capacity for; idle ones for other resources make room."""
-        if not self._again and (not self._workers or any(worker.idle for worker in self._workers)):
-            return
-        needed = self._resources(self._again[-1]) if self._again else self._workers[-1].resources
-        if self._again:
+    def _hire(self, needed: TaskResources | None = None) -> None:
+        """Start as many workers as the cluster has capacity for.
+
+        ``needed``: of a task that waits, for which idle workers with others make room; None: as before, if no
+        worker is idle.
+        """
+        if needed:
             self._remove([w for w in self._workers if w.resources != needed and not w.task])
+        elif self._has_place():
+            return
+        needed = needed or self._workers[-1].resources
         capacity = self._most or max(1, sum(map(needed.capacity, self._nodes())))
         for _ in range(capacity - len(self._workers)):
             self._workers.append(RayWorker(self._ray, needed))
 
-    def _remove(self, workers: list[RayWorker]) -> None:
-        for worker in list(workers):
-            worker.end()
-            self._workers.remove(worker)
-
     def _warn_of_waiting(self) -> None:
         """Warn if no worker has answered yet."""
-        if any(worker.node for worker in self._workers):
+        if any(worker.responded for worker in self._workers):
             return
         nodes = self._nodes()
         cpus, gpus = (sum(node.get(kind, 0) for node in nodes) for kind in ("CPU", "GPU"))
@@ -164,7 +131,6 @@ class RayCluster(Executor):
         )
 
     def _receive(self, on_progress: OnProgress) -> Iterator[Outcome]:
-        """Handle what workers answer, after a short wait for it."""
         answers = {worker.answer: worker for worker in self._workers if worker.answer is not None}
         progress = {worker.progress: worker for worker in self._workers if worker.progress is not None}
         calls = [*answers, *progress]
@@ -182,62 +148,27 @@ class RayCluster(Executor):
 
     def _handle_answer(self, worker: RayWorker) -> Outcome | None:
         """Handle the answer to ``hello`` or to a task; return the task's outcome if it has ended."""
-        call, task = worker.answer, worker.task
-        worker.answer = worker.task = worker.progress = None
         try:
-            answer = self._ray.get(call)
+            answer = self._ray.get(worker.answer)
         except self._ray.exceptions.RayError as error:
-            self._remove([worker])
-            if task:
-                return self._retry(worker, task, error)
-            self._count_stillborn(error)
-            return None
-        self._stillborn = 0
-        if task:
+            cause = ray_cause(error)
+            if not worker.responded and "No module named" in str(error):
+                raise UsageError(
+                    f"a node of the Ray cluster lacks a package: {cause}; warpsplat has to be on each"
+                ) from error
+            where = f"on {printable(worker.node)} " if worker.node else ""
+            return self._lost(worker, f"{where}was lost: {cause}")
+        worker.answer = worker.progress = None
+        if worker.task:
+            worker.task = None
             outcome: Outcome = answer
             return outcome
-        self._greet(worker, *answer)
-        return None
-
-    def _greet(self, worker: RayWorker, version: str, node: str) -> None:
-        worker.node = node
-        self._answered = max(self._answered, sum(bool(other.node) for other in self._workers))
-        self.workers = self._answered
+        version, worker.node = answer
         if version != __version__:
             raise UsageError(
-                f"node {printable(node)} of the Ray cluster has warpsplat {printable(version)}, "
+                f"node {printable(worker.node)} of the Ray cluster has warpsplat {printable(version)}, "
                 f"here it is {__version__}: results would differ; install one version on all"
             )
-
-    def _count_stillborn(self, error: BaseException) -> None:
-        cause = ray_cause(error)
-        self._stillborn += 1
-        if "No module named" in str(error):
-            raise UsageError(
-                f"a node of the Ray cluster lacks a package: {cause}; warpsplat has to be on each"
-            )
-        if self._stillborn >= MOST_STILLBORN:
-            raise ResourceError(f"workers of the Ray cluster end as soon as they begin: {cause}")
-
-    def _retry(self, worker: RayWorker, task: Task, error: BaseException) -> Outcome | None:
-        """Keep a task whose worker is lost for another try; return its failure if there were enough."""
-        self.lost += 1
-        self._tries[task.number] += 1
-        name, node = printable(task.name), printable(worker.node)
-        if self._tries[task.number] >= TRIES:
-            text = f"{name}: its worker on {node} was lost, for time {TRIES}: {ray_cause(error)}"
-            return Outcome(task.number, "failed", error=text)
-        log.warning("%s: its worker on %s was lost (%d so far); it is done again", name, node, self.lost)
-        self._again.append(task)
+        worker.responded, self._stillborn = True, 0
+        self.workers = max(self.workers, sum(other.responded for other in self._workers))
         return None
-
-    def _stop_tasks(self, on_progress: OnProgress) -> Iterator[Outcome]:
-        """End the tasks in progress: with the best so far if that comes soon."""
-        for worker in self._busy():
-            worker.stop()
-        deadline = time.monotonic() + GRACE
-        while self._busy() and time.monotonic() < deadline:
-            yield from self._receive(on_progress)
-        for task in [*self._again, *(worker.task for worker in self._busy() if worker.task)]:
-            yield Outcome(task.number, "stopped")
-        self._remove(self._busy())

@@ -14,16 +14,10 @@ from typing import Any
 
 from warpsplat.errors import UsageError, printable
 
-OBJECT_STORE = 200_000_000
-"""Memory for objects sent between processes, in a cluster of this machine alone [bytes]."""
-
-TIMEOUT = 5.0
-"""Seconds for a cluster to answer."""
-
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[None]:
-    """Connect to a cluster for a block, or use the connection that this process has already, and keep it.
+    """Connect to a cluster for a block.
 
     Args:
         ray: the package Ray.
@@ -32,9 +26,6 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
     Raises:
         UsageError: there is no such cluster, or it has other versions of Ray or Python.
     """
-    if ray.is_initialized():
-        yield
-        return
     with _quiet():
         with _signal_handlers_kept():
             _connect(ray, address)
@@ -74,7 +65,7 @@ def _answers(address: str) -> bool:
     if not host or not port.isdigit():
         return True
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=TIMEOUT).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=5.0).close()
     except (OSError, OverflowError):
         return False
     return True
@@ -83,7 +74,7 @@ def _answers(address: str) -> bool:
 def _init(ray: ModuleType, address: str) -> None:
     options: dict[str, Any] = {"configure_logging": False, "log_to_driver": False}
     if address == "local":
-        options |= {"include_dashboard": False, "object_store_memory": OBJECT_STORE}
+        options |= {"include_dashboard": False, "object_store_memory": 200_000_000}
     try:
         ray.init(address=address, **options)
     except (RuntimeError, ValueError, ImportError) as error:

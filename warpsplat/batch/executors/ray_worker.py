@@ -76,8 +76,9 @@ class RayWorker:
         self._ray = ray
         self.resources = resources
         self.node = ""
-        """Name of its node; empty until it has answered."""
+        """Name of its node."""
         self.task: Task | None = None
+        self.responded = False
         cpus, gpus = resources
         options = {"num_cpus": cpus, "num_gpus": gpus, "max_concurrency": 2, "max_restarts": 0}
         self._actor = ray.remote(Actor).options(**options).remote()
@@ -92,11 +93,11 @@ class RayWorker:
         return self.answer is None
 
     def give(self, task: Task) -> None:
-        """Hand it a task."""
+        """See ``TaskWorker``."""
         self.task = task
         # Ray shows a process only the GPUs that it may use.
         device = "cuda:0" if self.resources.gpus else "cpu"
-        task = replace(task, device=device, threads=self.resources.cpus, bring=True)
+        task = replace(task, device=device, threads=self.resources.cpus)
         self.answer = self._actor.do.remote(task)
 
     def ask_progress(self) -> None:
@@ -104,10 +105,10 @@ class RayWorker:
         self.progress = self.progress or self._actor.done.remote()
 
     def stop(self) -> None:
-        """Have its task end with the best so far."""
+        """See ``TaskWorker``."""
         self._actor.stop.remote()
 
     def end(self) -> None:
-        """End its process at once."""
+        """See ``TaskWorker``."""
         with contextlib.suppress(Exception):  # the cluster may be gone
             self._ray.kill(self._actor)

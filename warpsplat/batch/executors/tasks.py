@@ -27,7 +27,7 @@ class Task:
     name: str
     """Name of the image in messages."""
     output: str
-    """Path of the result. Its ending decides the format, also if the worker does not write it."""
+    """Path of the result, which the worker does not write; its ending decides the format."""
     settings: Settings
     device: str = "auto"
     threads: int | None = None
@@ -36,8 +36,6 @@ class Task:
     """Importance mask."""
     mask_name: str = ""
     """Name of the mask in messages."""
-    bring: bool = False
-    """Whether the worker returns the result's bytes (``Outcome.data``) instead of writing ``output``."""
     result: bytes | None = field(default=None, repr=False)
     """The result if it exists already, and only its figures are wanted."""
     report_back: str = ""
@@ -52,13 +50,11 @@ class Outcome:
 
     number: int
     status: Literal["made", "measured", "stopped", "failed"]
-    """``stopped``: by ``stop``, with a file of the best so far, or with none and an empty ``digest``."""
+    """``stopped``: by ``stop``, with the best so far as its ``data``, or with none."""
     key: str = ""
     """Key of the task; empty if its worker was lost or ended before the task."""
-    digest: str = ""
-    """SHA-256 of the result's bytes, hexadecimal."""
     data: bytes | None = field(default=None, repr=False)
-    """The result's bytes, if the task has ``bring``."""
+    """The result's bytes."""
     figures: dict[str, Any] = field(default_factory=dict)
     """See ``Result.as_dict``; for a task with a ``result``, those that can be measured."""
     error: str = ""
@@ -70,7 +66,10 @@ class Outcome:
 
 
 class Executor:
-    """Base of executors: does tasks. At the end of its ``with`` block, all its workers have ended."""
+    """Base of executors: does tasks, but writes no files; a lost worker that still runs can replace none.
+
+    At the end of its ``with`` block, all its workers have ended.
+    """
 
     workers: int = 1
     """How many tasks it does at the same time; for messages."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from warpsplat.batch.executors.tasks import OnProgress, Outcome, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
-from warpsplat.files.output import make_folder
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
@@ -19,7 +17,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import choose_device, start_warp
 from warpsplat.rendering.device_lock import device_lock
 from warpsplat.run.command_line import vectorize_command
-from warpsplat.run.formats import named_bytes, write_named
+from warpsplat.run.formats import named_bytes
 from warpsplat.run.prepare import load_target, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.vectorize import make_result
@@ -58,26 +56,16 @@ def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
     def advance(progress: Progress) -> None:
         on_progress(task.number, progress.work)
 
-    output, backend = Path(task.output), _backend(task)
-    if not task.bring:
-        make_folder(output.parent)
-    mask = None
+    backend, mask = _backend(task), None
     if task.mask is not None:
         mask = io.BytesIO(task.mask)
         mask.name = task.mask_name
     with device_lock(backend.device):
         prepared = prepare(task.image, task.settings, name=task.name, importance=mask, keyed=True)
-        write = None if task.bring else partial(write_named, output)
-        result = make_result(prepared, Run(backend, advance, stop), write)
-        data = named_bytes(output, result.svg, key=STOPPED if result.stopped else task.key)
-        outcome = Outcome(
-            task.number,
-            "stopped" if result.stopped else "made",
-            task.key,
-            digest(data),
-            data if task.bring else None,
-            result.as_dict(),
-        )
+        result = make_result(prepared, Run(backend, advance, stop))
+        data = named_bytes(Path(task.output), result.svg, key=STOPPED if result.stopped else task.key)
+        status: Literal["stopped", "made"] = "stopped" if result.stopped else "made"
+        outcome = Outcome(task.number, status, task.key, data, result.as_dict())
         return outcome if result.stopped else _with_report(outcome, task, result.svg, backend, result)
 
 
@@ -85,7 +73,7 @@ def _measured(task: Task, data: bytes) -> Outcome:
     """Measure a result that exists."""
     svg = svg_text(data, task.output)
     score = score_svg(svg, load_target(task.image, task.name, task.settings.background), eyes=False)
-    outcome = Outcome(task.number, "measured", task.key, digest(data), figures=score.as_dict())
+    outcome = Outcome(task.number, "measured", task.key, data, score.as_dict())
     if not task.report_back:
         return outcome
     backend = _backend(task)
@@ -125,8 +113,3 @@ def _with_report(
     except (WarpsplatError, OSError, MemoryError) as error:
         return replace(outcome, report_error=failure(error, task.name, task.output))
     return replace(outcome, report=page)
-
-
-def digest(data: bytes) -> str:
-    """Return the SHA-256 of a result."""
-    return hashlib.sha256(data).hexdigest()

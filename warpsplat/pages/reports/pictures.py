@@ -6,6 +6,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ from warpsplat.pages.environment import webp_uri
 from warpsplat.run.memory import facts_of
 from warpsplat.run.render import to_pillow
 from warpsplat.scene import FloatArray
+from warpsplat.svg.page import picture_view, with_view
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -36,9 +38,6 @@ QUALITIES = (92, 85, 75, 60, 40, 20)
 
 MAP_QUALITIES = (70, 50, 30, 10)
 """Qualities of the error map."""
-
-FEW_COLORS = 4096
-"""Most colours of an image that is encoded without loss, as a drawing."""
 
 MOST_ERROR = 64.0
 """End of the error map's scale, the same on all pages [levels of 255]."""
@@ -59,11 +58,6 @@ class ShownImage:
     """Height of the image itself [px]."""
 
     @property
-    def is_transparent(self) -> bool:
-        """Whether it has opacity."""
-        return self.pixels.shape[2] == 4
-
-    @property
     def reduced_size(self) -> str:
         """Size of the pixels if the image itself is larger; otherwise empty."""
         height, width = self.pixels.shape[:2]
@@ -77,13 +71,12 @@ def shown_image(source: ImageSource, name: str | None, most: int = PAGE_PIXELS) 
         ImageError, TypeError: as ``image_of``.
     """
     facts = facts_of(source)
-    factor = 1
-    if facts:
-        width, height = facts.width, facts.height
-        factor = math.ceil(max(1, math.sqrt(width * height / most), max(width, height) / WEBP_SIDE))
-    pixels = image_of(source, name, factor=factor)
-    height, width = (facts.height, facts.width) if facts else pixels.shape[:2]
-    return ShownImage(pixels, width, height)
+    if facts is None:
+        pixels = image_of(source, name)
+        return ShownImage(pixels, pixels.shape[1], pixels.shape[0])
+    width, height = facts.width, facts.height
+    factor = math.ceil(max(1, math.sqrt(width * height / most), max(width, height) / WEBP_SIDE))
+    return ShownImage(image_of(source, name, factor=factor), width, height)
 
 
 def capacity_of(image: ImageSource) -> float:
@@ -92,11 +85,11 @@ def capacity_of(image: ImageSource) -> float:
 
 
 def error_map(drawn: Bytes, target: FloatArray) -> Bytes:
-    """Return the root mean square difference of the channels of each pixel, in colours of a scale.
+    """Return the root mean square difference of the channels of each pixel on white, in colours of a scale.
 
     Args:
         drawn: the file as a viewer shows it, not premultiplied, shape (height, width, 4).
-        target: the image, as ``ShownImage.pixels``. Both are composited on white.
+        target: the image, as ``ShownImage.pixels``.
 
     Returns:
         RGB from black for no difference to white for ``MOST_ERROR`` and more, shape (height, width, 3).
@@ -129,7 +122,7 @@ def _bytes_on_white(drawn: Bytes) -> FloatArray:
 def encoded(pixels: FloatArray, capacity: float) -> str:
     """Return an image as a data URI of a WebP of at most ``capacity`` bytes, drawings without loss."""
     image = to_pillow(pixels)
-    if image.getcolors(FEW_COLORS):
+    if image.getcolors(4096):  # a drawing
         data = _webp(image, lossless=True)
         if len(data) <= capacity:
             return webp_uri(data)
@@ -145,19 +138,25 @@ def first_that_fits(image: Image.Image, qualities: Sequence[int], capacity: floa
     return first_that_fits(image.reduce(2), qualities[-2:], capacity)
 
 
-def _webp(image: Image.Image, *, lossless: bool = False, quality: int = 80) -> bytes:
+def original_entry(url: str) -> dict[str, Any]:
+    """Return the viewer's entry of an image: its name, label, address, and whether pixels stay sharp."""
+    return {"name": "image", "label": "Original", "url": url, "pixels": True}
+
+
+def picture_alone(svg: str, shown: ShownImage) -> tuple[str, str | None]:
+    """Return a file as its picture alone if it is on a sheet, with the view box; else it and None."""
+    view = picture_view(svg, shown.width, shown.height)
+    return (svg if view is None else with_view(svg, view, shown.width, shown.height)), view
+
+
+def _webp(image: Image.Image, **options: int) -> bytes:
     file = io.BytesIO()
-    image.save(file, "WEBP", lossless=lossless, quality=quality, method=2)
+    image.save(file, "WEBP", method=2, **options)
     return file.getvalue()
 
 
 def thumbnails(target: FloatArray, drawn: Bytes) -> str:
-    """Return small copies of an image and of the file, side by side on white, as a data URI.
-
-    Args:
-        target: the image, as ``ShownImage.pixels``.
-        drawn: the file, not premultiplied, shape (height, width, 4).
-    """
+    """Return small copies of an image and a file, as for ``error_map``, side by side, as a data URI."""
     height, width = target.shape[:2]
     scale = min(1.0, THUMBNAIL / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))

@@ -6,26 +6,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.errors import printable
 from warpsplat.files.sources import ImageSource, held
-from warpsplat.pages import page
+from warpsplat.pages.environment import page
 from warpsplat.pages.plot import Mark, Plot, plot
-from warpsplat.pages.reports.pictures import capacity_of, encoded, shown_image
+from warpsplat.pages.reports.pictures import capacity_of, encoded, original_entry, picture_alone, shown_image
 from warpsplat.pages.reports.single import Facts, headline, notes
 from warpsplat.run.result import Result
-from warpsplat.svg.page import picture_view, with_view
-
-ASSETS = ("viewer.css", "report.css", "several.css", "viewer.js", "several.js")
 
 Floats = npt.NDArray[np.float64]
-
-LEAST_HEIGHT = 1e-6
-"""Least height of a knee above the chord, as a share of the whole gain: less is rounding."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +52,7 @@ def versions_of(results: Sequence[Result], svg_name: str) -> list[Version]:
 
 
 def several_page(versions: Sequence[Version], image: ImageSource, *, name: str, command: str = "") -> str:
-    """Return the page.
-
-    Args:
-        versions: versions of the image, ascending by their shapes.
-        image: the image that they show.
-        name: name of the image, for people.
-        command: command that makes them again.
+    """Return the page on ``versions`` of an image, ascending by their shapes; ``command`` makes them again.
 
     Raises:
         ImageError: the image cannot be read.
@@ -84,37 +71,29 @@ def several_page(versions: Sequence[Version], image: ImageSource, *, name: str, 
         }
         for number, version in enumerate(versions)
     ]
-    original = encoded(shown.pixels, capacity_of(image))
-    pictures: list[dict[str, Any]] = [
-        {"name": "image", "label": "Original", "url": original, "pixels": True},
-        *({"name": card["key"], "label": card["label"], "url": "", "pixels": False} for card in cards),
-    ]
     sentences = [note for version in versions for note in notes(Facts.of(version.result))]
     return page(
         "several.html.j2",
-        assets=ASSETS,
+        assets=("viewer.css", "report.css", "several.css", "viewer.js", "several.js"),
         name=printable(name),
         versions=cards,
-        pictures=pictures,
+        pictures=[
+            original_entry(encoded(shown.pixels, capacity_of(image))),
+            *({"name": card["key"], "label": card["label"], "url": "", "pixels": False} for card in cards),
+        ],
         width=shown.width,
         height=shown.height,
         reduced=shown.reduced_size,
-        transparent=shown.is_transparent,
+        transparent=shown.pixels.shape[2] == 4,
         notes=list(dict.fromkeys(sentences)),
         plots=plots(versions, at),
         knee=_explanation(versions, at),
         command=command,
         data={
-            f"version-{number}": _shown(version.result.svg, shown.width, shown.height)
-            for number, version in enumerate(versions)
+            str(card["key"]): picture_alone(version.result.svg, shown)[0]
+            for card, version in zip(cards, versions, strict=True)
         },
     )
-
-
-def _shown(svg: str, width: int, height: int) -> str:
-    """Return a file as it is shown and downloaded; one on a sheet as its picture alone."""
-    view = picture_view(svg, width, height)
-    return svg if view is None else with_view(svg, view, width, height)
 
 
 def knee(cost: Floats, gain: Floats) -> int | None:
@@ -135,7 +114,7 @@ def knee(cost: Floats, gain: Floats) -> int | None:
     across = (cost - cost[0]) / (cost[-1] - cost[0])
     above = (gain - gain[0]) / (gain[-1] - gain[0]) - across
     best = int(above.argmax())
-    return best if above[best] > LEAST_HEIGHT and 0 < best < len(cost) - 1 else None
+    return best if above[best] > 1e-6 and 0 < best < len(cost) - 1 else None  # less is rounding
 
 
 def knee_of(versions: Sequence[Version]) -> int | None:

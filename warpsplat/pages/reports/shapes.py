@@ -22,12 +22,6 @@ from warpsplat.svg.read import KeptScene
 ROUNDING = 1 / (12 * 255**2)
 """Mean squared error of rounding to 8 bits: an exact file has a finite PSNR by it."""
 
-MOST_LAYERS = 24
-"""Most named groups that are offered as layers."""
-
-PARTS = 4
-"""Layers of a file without names: parts of its shapes in painter's order."""
-
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -119,13 +113,11 @@ def _kind(scene: Scene, shape: int) -> str:
 
 def _colors(scene: Scene) -> list[list[str]]:
     flat, stops = hex_colors(scene.colors), hex_colors(scene.stop_colors)
-    found: list[list[str]] = []
-    for shape, (first, last) in enumerate(itertools.pairwise(scene.stop_first.tolist())):
-        if scene.paint[shape] == Paint.PICTURE:
-            found.append([])
-        else:
-            found.append([stops[first], stops[last - 1]] if last > first else [flat[shape]])
-    return found
+    ends = itertools.pairwise(scene.stop_first.tolist())
+    return [
+        [] if paint == Paint.PICTURE else [stops[first], stops[last - 1]] if last > first else [color]
+        for paint, color, (first, last) in zip(scene.paint, flat, ends, strict=True)
+    ]
 
 
 def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
@@ -133,9 +125,9 @@ def _layers(base: KeptScene) -> tuple[list[int], list[str]]:
     count = len(base.scene)
     named = _named_groups(base.document, base.elements)
     names = list(dict.fromkeys(named))
-    if 1 < len(names) <= MOST_LAYERS:
+    if 1 < len(names) <= 24:
         return [names.index(name) for name in named], names
-    parts = min(PARTS, count)
+    parts = min(4, count)
     layers: npt.NDArray[np.intp] = np.arange(count) * parts // max(count, 1)
     ends = np.searchsorted(layers, np.arange(parts), "right")
     words = {0: " (back)", parts - 1: " (front)"} if parts > 1 else {}

@@ -12,7 +12,7 @@ from PIL import Image
 from warpsplat.errors import ImageError, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.progress import Progress
-from warpsplat.pages import page
+from warpsplat.pages.environment import page
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.pages.reports.pictures import (
     MAP_QUALITIES,
@@ -25,6 +25,8 @@ from warpsplat.pages.reports.pictures import (
     error_map,
     first_that_fits,
     map_colors,
+    original_entry,
+    picture_alone,
     shown_image,
     thumbnails,
 )
@@ -34,8 +36,6 @@ from warpsplat.run.result import Result
 from warpsplat.svg.page import picture_view, with_view
 from warpsplat.svg.read import load_kept
 from warpsplat.svg.viewer import draw
-
-ASSETS = ("viewer.css", "report.css", "viewer.js", "report.js")
 
 EXACT = "exact"
 """Text for a PSNR that is not finite."""
@@ -109,8 +109,7 @@ def report_page(
     image = held(image)
     shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
-    view = picture_view(svg, shown.width, shown.height)
-    drawn = svg if view is None else with_view(svg, view, shown.width, shown.height)
+    drawn, view = picture_alone(svg, shown)
     base, target, why_not = None, shown.pixels, ""
     try:
         base, target = matched(load_kept(drawn, width, height, svg_name), shown.pixels)
@@ -121,7 +120,7 @@ def report_page(
     count = len(listed["kinds"]) if listed else 0
     return page(
         "report.html.j2",
-        assets=ASSETS,
+        assets=("viewer.css", "report.css", "viewer.js", "report.js"),
         name=printable(name),
         svg_name=printable(svg_name),
         back=back,
@@ -150,7 +149,7 @@ def _pictures(shown: ShownImage, errors: Any, capacity: float) -> list[dict[str,
     differences = first_that_fits(Image.fromarray(errors), MAP_QUALITIES, capacity / 3)
     original = encoded(shown.pixels, capacity - len(differences) * 3 / 4)  # base64 takes four bytes for three
     return [
-        {"name": "image", "label": "Original", "url": original, "pixels": True},
+        original_entry(original),
         {"name": "svg", "label": "SVG", "url": "", "pixels": False},
         {"name": "error", "label": "Error map", "url": differences, "pixels": True},
     ]
@@ -158,12 +157,11 @@ def _pictures(shown: ShownImage, errors: Any, capacity: float) -> list[dict[str,
 
 def headline(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Return the most important figures: name, value, unit."""
-    found = [
-        (name, value, unit)
+    return [
+        (name, value, "" if value == EXACT else unit)
         for name, key, form, _, unit in FIGURES
         if form and (value := _value(figures, key, form)) is not None
     ]
-    return [(name, value, "" if value == EXACT else unit) for name, value, unit in found]
 
 
 def table(facts: Facts, shown: ShownImage) -> list[tuple[str, str]]:

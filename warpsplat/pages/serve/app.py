@@ -10,7 +10,7 @@ import contextlib
 import json
 import os
 import traceback
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from urllib.parse import quote
 
 from starlette.applications import Starlette
@@ -24,23 +24,14 @@ from warpsplat.errors import ImageError, UsageError, WarpsplatError, explain
 from warpsplat.native import release_memory
 from warpsplat.pages.serve.form import serve_page, settings_of
 from warpsplat.pages.serve.guard import line
-from warpsplat.pages.serve.limits import Refused
+from warpsplat.pages.serve.sessions import Refused
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.uploads import DEFAULT_NAME, plain_name, read_upload
 from warpsplat.pages.serve.worker import Machine, start_worker
 from warpsplat.run.command_line import vectorize_command
 
-MAX_REQUEST = 20_000
-"""Largest body of a request that is no image [bytes]."""
-
 UPLOAD_TIME = 300.0
 """Longest upload [s]: others wait for the memory that is reserved for it."""
-
-EXPIRY_INTERVAL = 2.0
-"""Time between two searches for pages that were closed [s]."""
-
-LAST_WAIT = 10.0
-"""Longest wait for the current run when the server ends [s]."""
 
 EVENT_INTERVAL = 0.15
 """Shortest time between two events [s]."""
@@ -55,9 +46,9 @@ CACHED = {"Cache-Control": "private, max-age=3600, immutable"}
 class Service:
     """The answers to a page's requests."""
 
-    def __init__(self, store: Store, machine: Machine, max_memory: str | None = None) -> None:
-        """Start nothing yet; ``max_memory``: limit of each run, as on the command line."""
-        self._store, self._machine, self._max_memory = store, machine, max_memory
+    def __init__(self, store: Store, machine: Machine) -> None:
+        """Start nothing yet."""
+        self._store, self._machine = store, machine
         self._page = serve_page(store.limits)
         self._decoding = asyncio.Semaphore(1)
 
@@ -71,10 +62,10 @@ class Service:
             ("GET", f"{session}/events", self.stream_events),
             ("POST", f"{session}/images", self.upload),
             ("GET", image, self.show_image),
-            ("DELETE", image, self.remove_image),
+            ("DELETE", image, self._action(self._store.remove_upload)),
             ("POST", f"{session}/runs", self.start),
-            ("POST", f"{run}/stop", self.stop),
-            ("DELETE", run, self.remove_run),
+            ("POST", f"{run}/stop", self._action(self._store.stop_run)),
+            ("DELETE", run, self._action(self._store.remove_run)),
             ("GET", f"{run}/live.svg", self.show_live),
             ("GET", f"{run}/result.svg", self.show_result),
         )
@@ -93,11 +84,11 @@ class Service:
         finally:
             expiring.cancel()
             self._store.close()
-            await run_in_threadpool(worker.join, LAST_WAIT)
+            await run_in_threadpool(worker.join, 10.0)  # for the current run
 
     async def _expire(self) -> None:
         while True:
-            await asyncio.sleep(EXPIRY_INTERVAL)
+            await asyncio.sleep(2.0)
             if self._store.expire():
                 await run_in_threadpool(release_memory)
 
@@ -158,38 +149,31 @@ class Service:
         upload = self._store.upload(*_names(request))
         return Response(upload.picture, media_type=upload.media_type, headers=CACHED)
 
-    async def remove_image(self, request: Request) -> Response:
-        """Forget an image and its runs."""
-        self._store.remove_upload(*_names(request))
-        await run_in_threadpool(release_memory)
-        return Response(status_code=204)
+    def _action(self, act: Callable[[str, str], None]) -> Callable[[Request], Awaitable[Response]]:
+        """Return an answer that calls a method of the store with the names in the address."""
+
+        async def answer(request: Request) -> Response:
+            act(*_names(request))
+            await run_in_threadpool(release_memory)
+            return Response(status_code=204)
+
+        return answer
 
     async def start(self, request: Request) -> Response:
         """Queue a run of ``image`` with ``settings``."""
         session = request.path_params["session"]
         try:
-            given = json.loads(await _body(request, MAX_REQUEST, "the request"))
+            given = json.loads(await _body(request, 20_000, "the request"))
         except ValueError:  # includes a wrong encoding
             given = None
         if not isinstance(given, dict):
             raise Refused(400, "the request must be a JSON object")
         image = str(given.get("image"))
         upload = self._store.upload(session, image)
-        values, settings = settings_of(given.get("settings", {}), self._max_memory)
+        values, settings = settings_of(given.get("settings", {}), self._machine.max_memory)
         path = f"./{upload.name}" if upload.name.startswith("-") else upload.name
         command = vectorize_command(settings, path, f"{os.path.splitext(path)[0]}.svg")
         return JSONResponse({"run": self._store.add_run(session, image, values, settings, command)}, 201)
-
-    async def stop(self, request: Request) -> Response:
-        """End a run with its current shapes."""
-        self._store.stop_run(*_names(request))
-        return Response(status_code=204)
-
-    async def remove_run(self, request: Request) -> Response:
-        """Forget a run."""
-        self._store.remove_run(*_names(request))
-        await run_in_threadpool(release_memory)
-        return Response(status_code=204)
 
     async def show_live(self, request: Request) -> Response:
         """Send the current shapes of a run."""

@@ -12,23 +12,21 @@ from warpsplat.cli.echo import echo, set_verbosity
 from warpsplat.cli.options import threads_option
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
-from warpsplat.pages.serve.limits import Limits
-
-HOST, PORT = "127.0.0.1", 8765
+from warpsplat.pages.serve.sessions import Limits
 
 
 @click.command("serve", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
-    default=PORT,
+    default=8765,
     show_default=True,
     metavar="N",
     help="Port to listen on; 0: any that is free.",
 )
 @click.option(
     "--host",
-    default=HOST,
+    default="127.0.0.1",
     show_default=True,
     metavar="ADDRESS",
     help="Address to listen on; other machines can reach any but 127.0.0.1 and ::1.",
@@ -80,9 +78,7 @@ def command(
     settings_from({"max_memory": max_memory})  # reports errors now
     start_warp()
     choose_device(device)
-    server = WarpsplatServer(
-        host, port, machine=Machine(device, threads), limits=limits, max_memory=max_memory
-    )
+    server = WarpsplatServer(host, port, Machine(device, threads, max_memory), limits)
     if not is_loopback(host):
         risk = "others can reach it, and anyone with the address can use it; it is not encrypted"
         echo(f"warpsplat: --host {host}: {risk}", err=True)

@@ -11,10 +11,8 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-MOST = 500
-"""Most connections."""
-
-LEAST = 2
+MOST, LEAST = 500, 2
+"""Range of the number of connections."""
 
 RESERVE = 24
 """Open files kept for other purposes: pipes to worker processes, compiled kernels, the system's own."""
@@ -24,9 +22,6 @@ HEAD_TIME = 5.0
 
 BODY_TIME = 60.0
 """Longest pause within the body of a request [s]."""
-
-RETRY = 1.0
-"""Pause after a connection could not be accepted [s]."""
 
 
 def most_connections() -> int:
@@ -88,9 +83,7 @@ class Protocol(H11Protocol):
 async def accept(listener: socket.socket, make: Callable[[], Protocol]) -> None:
     """Accept connections while there are files for them; further ones wait in the system's queue.
 
-    Args:
-        listener: a listening socket that does not block.
-        make: returns the protocol of a new connection.
+    ``listener``: a listening socket that does not block; ``make``: returns the protocol of a new connection.
     """
     loop = asyncio.get_running_loop()
     free = asyncio.Semaphore(most_connections())
@@ -107,4 +100,4 @@ async def accept(listener: socket.socket, make: Callable[[], Protocol]) -> None:
             if not has_warned:
                 logging.getLogger("warpsplat").warning("connections have to wait: %s", error.strerror)
             has_warned = True
-            await asyncio.sleep(RETRY)
+            await asyncio.sleep(1.0)

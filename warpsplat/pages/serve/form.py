@@ -7,8 +7,8 @@ from typing import Any
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.pages import page
-from warpsplat.pages.serve.limits import Limits
+from warpsplat.pages.environment import page
+from warpsplat.pages.serve.sessions import Limits
 from warpsplat.run.options import BY_NAME
 
 FIELDS = ("subject", "curves", "closed", "open", "mixed", "quality", "paint", "colors")
@@ -28,15 +28,12 @@ def serve_page(limits: Limits) -> str:
     )
 
 
-def settings_of(given: object, max_memory: str | None = None) -> tuple[dict[str, Any], Settings]:
-    """Return the settings that a page asks for.
+def settings_of(given: object, max_memory: str | None) -> tuple[dict[str, Any], Settings]:
+    """Return the options that a page gives, in the order of ``FIELDS``, and the settings.
 
     Args:
         given: options and their values, as parsed from JSON.
         max_memory: limit of the server.
-
-    Returns:
-        The values that were given, in the order of ``FIELDS``, and the settings.
 
     Raises:
         UsageError: an option that the page does not offer, or an invalid value.

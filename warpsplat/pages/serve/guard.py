@@ -89,7 +89,7 @@ class Guard:
         return None
 
     def _is_trusted(self, name: str) -> bool:
-        """Tell whether a host is an address or a name that nobody else can make lead here."""
+        """Return whether a host is an address or a name that nobody else can make lead here."""
         if name.lower() in {"localhost", self._host}:
             return bool(name)
         try:
@@ -103,7 +103,7 @@ class Guard:
 
 
 def _is_same_origin(headers: Headers) -> bool:
-    """Tell whether a request comes from a page of this server, or from no page."""
+    """Return whether a request comes from a page of this server, or from no page."""
     origin = headers.get("origin")
     if origin is None:
         return headers.get("sec-fetch-site", "none") in {"same-origin", "none"}

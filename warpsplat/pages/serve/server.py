@@ -18,15 +18,9 @@ from warpsplat.errors import UsageError, printable
 from warpsplat.pages.serve.app import Service
 from warpsplat.pages.serve.connections import Protocol, accept
 from warpsplat.pages.serve.guard import TOKEN, Guard
-from warpsplat.pages.serve.limits import Limits
+from warpsplat.pages.serve.sessions import Limits
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
-
-POLL = 0.1
-"""Time between two calls of ``stop`` [s]."""
-
-LAST_ANSWERS = 2
-"""Longest wait for unfinished answers when the server ends [s]."""
 
 
 def listening_socket(host: str, port: int) -> socket.socket:
@@ -49,7 +43,7 @@ def listening_socket(host: str, port: int) -> socket.socket:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether only this machine can connect to an address."""
+    """Return whether only this machine can connect to an address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -59,16 +53,8 @@ def is_loopback(host: str) -> bool:
 class WarpsplatServer:
     """A server that listens from the beginning, and answers during ``run``."""
 
-    def __init__(
-        self,
-        host: str,
-        port: int,
-        *,
-        machine: Machine | None = None,
-        limits: Limits | None = None,
-        max_memory: str | None = None,
-    ) -> None:
-        """Listen; a ``port`` of 0 is any that is free, and ``max_memory`` the limit of each run.
+    def __init__(self, host: str, port: int, machine: Machine, limits: Limits) -> None:
+        """Listen; a ``port`` of 0 is any that is free.
 
         Raises:
             UsageError: the address cannot be used.
@@ -77,7 +63,7 @@ class WarpsplatServer:
         self.port = int(self._socket.getsockname()[1])
         self._token = secrets.token_urlsafe(24)
         self.store = Store(limits)
-        self._guard = Guard(Service(self.store, machine or Machine(), max_memory).app(), self._token, host)
+        self._guard = Guard(Service(self.store, machine).app(), self._token, host)
 
     def close(self) -> None:
         """Stop listening."""
@@ -108,14 +94,14 @@ class WarpsplatServer:
             log_config=None,
             access_log=False,
             server_header=False,
-            timeout_graceful_shutdown=LAST_ANSWERS,
+            timeout_graceful_shutdown=2,
         )
         server = uvicorn.Server(config)
         # Our own handlers of signals make ``stop`` true, and also handle a second Ctrl-C.
         server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
         serving = asyncio.create_task(server.serve([]))
         while not (server.started or serving.done()):
-            await asyncio.sleep(POLL / 10)
+            await asyncio.sleep(0.01)
         stop()  # from the first call on a signal is a request to stop
         state = server.server_state
         make = functools.partial(Protocol, config, state, server.lifespan.state)
@@ -125,7 +111,7 @@ class WarpsplatServer:
             for connection in list(state.connections):
                 assert isinstance(connection, Protocol)
                 connection.close_if_idle()
-            await asyncio.sleep(POLL)
+            await asyncio.sleep(0.1)
         self.store.close()  # ends the streams of events, which uvicorn would wait for
         accepting.cancel()
         self._socket.close()

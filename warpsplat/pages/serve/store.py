@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from warpsplat.fit.settings import Settings
-from warpsplat.pages.serve.limits import Limits, Refused
 from warpsplat.pages.serve.live import Live
-from warpsplat.pages.serve.sessions import QueuedRun, Session
+from warpsplat.pages.serve.sessions import Limits, QueuedRun, Refused, Session
 from warpsplat.pages.serve.uploads import Upload
 from warpsplat.run.result import Result
 
@@ -32,8 +31,8 @@ class Store:
     Methods that take the name of a session, an image or a run raise ``Refused`` if it does not exist.
     """
 
-    def __init__(self, limits: Limits | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self.limits = limits or Limits()
+    def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
+        self.limits = limits
         self.version = 0
         """Grows with every change that a page shows."""
         self.closed = False
@@ -78,7 +77,7 @@ class Store:
                 session.seen = self._clock()
 
     def is_attended(self, name: str) -> bool:
-        """Tell whether anybody reads a session's events."""
+        """Return whether anybody reads a session's events."""
         with self._lock:
             return name in self._sessions and self._sessions[name].readers > 0
 
@@ -216,18 +215,6 @@ class Store:
             self._changed()
 
     # Capacity
-
-    def held(self) -> dict[str, int]:
-        """Return the numbers of sessions and runs, and the sizes of images and results [bytes]."""
-        with self._lock:
-            return {
-                "sessions": len(self._sessions),
-                "runs": sum(1 for _ in self._all_runs()),
-                "waiting": len(self._queue),
-                "images": self._image_bytes(),
-                "results": self._result_bytes(),
-                "uploading": self._uploading,
-            }
 
     def _changed(self) -> None:
         with self._lock:

@@ -15,14 +15,6 @@ from warpsplat.native import release_memory
 from warpsplat.pages.reports.pictures import shown_image
 from warpsplat.run.render import to_pillow
 
-SHOWN_PIXELS = 4_000_000
-"""Most pixels of the picture: a screen has as many."""
-
-LOSSLESS_PIXELS = 1_000_000
-"""Pixels up to which the picture is lossless."""
-
-WEBP_QUALITY = 92
-
 LONGEST_NAME = 100
 """Most characters of a file's name."""
 
@@ -74,15 +66,15 @@ def read_upload(data: bytes, name: str) -> Upload:
     """
     if not data:
         raise ImageError(f"{name}: the file is empty")
-    shown = shown_image(data, name, SHOWN_PIXELS)
+    shown = shown_image(data, name, 4_000_000)  # a screen has as many
     image = to_pillow(shown.pixels)
     buffer = io.BytesIO()
-    if image.width * image.height <= LOSSLESS_PIXELS:
+    if image.width * image.height <= 1_000_000:
         media_type = "image/png"
         image.save(buffer, "PNG", compress_level=3)
     else:
         media_type = "image/webp"
-        image.save(buffer, "WEBP", quality=WEBP_QUALITY, method=2)
+        image.save(buffer, "WEBP", quality=92, method=2)
     width, height, transparent = shown.width, shown.height, shown.pixels.shape[2] == 4
     del shown, image
     release_memory()

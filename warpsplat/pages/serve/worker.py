@@ -19,10 +19,11 @@ from warpsplat.run.result import Result
 
 @dataclass(frozen=True)
 class Machine:
-    """Where runs are computed."""
+    """Where runs are computed, and within which limit of memory."""
 
     device: str = "auto"
     threads: int | None = None
+    max_memory: str | None = None
 
 
 def start_worker(store: Store, machine: Machine) -> threading.Thread:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from typing import Any
 
 import click
@@ -54,15 +53,8 @@ def table(values: dict[str, Any], verbose: int) -> str:
     )
 
 
-def number_option(
-    name: str, numbers: click.ParamType, default: float, text: str
-) -> Callable[[Function], Function]:
-    """Return a click option."""
-    return click.option(name, type=numbers, default=default, metavar="N", help=text)
-
-
 @click.command("bench", context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
-@number_option("--curves", click.IntRange(1, 100_000), 512, "Number of shapes.")
+@click.option("--curves", type=click.IntRange(1, 100_000), default=512, metavar="N", help="Number of shapes.")
 @click.option("--size", default="768x512", metavar="WxH", help="Size of the canvas [px].")
 @click.option("--kind", type=click.Choice(["closed", "open"]), default="closed", help="Fills or strokes.")
 @click.option(
@@ -71,11 +63,17 @@ def number_option(
     default="exact",
     help="Model of coverage, as in vectorize.",
 )
-@number_option("--opacity", click.FloatRange(0.02, 0.99), 0.9, "Opacity of each shape.")
+@click.option(
+    "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, metavar="N", help="Opacity of each shape."
+)
 @click.option("--device", default="auto", help="auto, cpu, or cuda:N.")
 @threads_option
-@number_option("--repeats", click.IntRange(1, 10_000), 20, "Number of timed steps.")
-@number_option("--seed", click.IntRange(0, 2**32 - 1), 0, "Seed of the random scene.")
+@click.option(
+    "--repeats", type=click.IntRange(1, 10_000), default=20, metavar="N", help="Number of timed steps."
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**32 - 1), default=0, metavar="N", help="Seed of the random scene."
+)
 @click.option("--torch", "through_torch", is_flag=True, help="Also time the passes through PyTorch.")
 @click.option("-v", "--verbose", count=True, show_default=False, help="Also list the kernels.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

@@ -45,23 +45,20 @@ def svg_name(image: Path, program: str, setting: str) -> str:
     return f"{image.stem}.{program.lower()}-{setting}.svg"
 
 
-def result_names(images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer) -> list[str]:
-    """Return the names of all files that a comparison writes."""
-    from warpsplat.tools.compare import OURS
-
-    made = [(OURS, str(ours.curves)) for ours in settings]
-    made += [(tracer.name, setting) for setting in tracer.settings]
-    return [*(svg_name(image, *one) for image in images for one in made), TABLES, FIGURES]
-
-
-def prepare_folder(folder: Path, names: Sequence[str], images: Sequence[Path], *, overwrite: bool) -> None:
+def prepare_folder(
+    folder: Path, images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer, *, overwrite: bool
+) -> None:
     """Make the folder of the results, and check that they can be written.
 
     Raises:
         UsageError: they cannot, or exist and ``overwrite`` is not given.
     """
     from warpsplat.files.output import check_output
+    from warpsplat.tools.compare import OURS
 
+    made = [(OURS, str(ours.curves)) for ours in settings]
+    made += [(tracer.name, setting) for setting in tracer.settings]
+    names = [*(svg_name(image, *one) for image in images for one in made), TABLES, FIGURES]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -137,7 +134,7 @@ def command(
     tracer = TRACERS[against]()
     sources = read_images(images)
     if output:
-        prepare_folder(output, result_names(images, settings, tracer), images, overwrite=overwrite)
+        prepare_folder(output, images, settings, tracer, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
     from warpsplat.files.output import write_result
