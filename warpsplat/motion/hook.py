@@ -25,10 +25,7 @@ PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
 
 OPTIONS = {
     "animate": click.option(
-        "--animate",
-        type=FILE,
-        metavar="FILE",
-        help="Also write an animation: .svg, .gif, .webp or .mp4.",
+        "--animate", type=FILE, metavar="FILE", help="Also write an animation: .svg, .gif, .webp or .mp4."
     ),
     "animate_what": click.option(
         "--animate-what",
@@ -59,7 +56,6 @@ class MotionHook(RunHook):
     def __init__(
         self, animate: Path | None, animate_what: Any, animate_width: int | None, preview: str | None
     ) -> None:
-        """Take the values of the options."""
         self._file, self._what, self._width, self._protocol = animate, animate_what, animate_width, preview
         self._recorder: Recorder | None = None
         self._preview: Preview | None = None

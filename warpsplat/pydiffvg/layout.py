@@ -85,14 +85,11 @@ class Area(NamedTuple):
 
 
 class Transforms(NamedTuple):
-    """The transforms of the groups."""
+    """Indices of the entries of the groups' transforms, shape (9 x group,); group of each point and row."""
 
     entries: Tensor
-    """Indices of their entries, shape (9 x group,)."""
     point_group: Tensor
-    """Group of each point, shape (point,)."""
     row_group: Tensor
-    """Group of each row, shape (row,)."""
 
 
 class Gradients(NamedTuple):

@@ -50,11 +50,7 @@ class BoundedOptimizer:
 def make_optimizer(
     settings: dict[str, Any], groups: list[dict[str, Any]], bounds: Bounds | None, is_sorted: bool = False
 ) -> BoundedOptimizer:
-    """Return the optimiser that ``settings`` name for parameter groups.
-
-    Raises:
-        UsageError: an unknown optimiser.
-    """
+    """Return the optimiser that ``settings`` name for parameter groups."""
     name = settings["optimizer"]
     if name not in OPTIMIZERS:
         raise UsageError(f"optimizer {shown(name)} is none of {', '.join(OPTIMIZERS)}")
@@ -78,11 +74,7 @@ class OptimizableTransform(torch.nn.Module):
     """Signs of the scales, shape (2,)."""
 
     def __init__(self, matrix: Tensor, settings: dict[str, Any]) -> None:
-        """Start at ``matrix``, shape (3, 3).
-
-        Raises:
-            UsageError: an unknown mode.
-        """
+        """Start at ``matrix``, shape (3, 3)."""
         super().__init__()
         mode = settings["transform_mode"]
         if mode not in MODES:

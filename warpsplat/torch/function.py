@@ -88,11 +88,7 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
 
 
 def check_finite(values: Mapping[str, Tensor]) -> None:
-    """Check that all numbers are finite, with one transfer from the device.
-
-    Raises:
-        ValueError: one is not.
-    """
+    """Raise a ``ValueError`` if a number is not finite, with one transfer from the device."""
     finite = torch.stack([value.detach().isfinite().all() for value in values.values()]).tolist()
     if not all(finite):
         wrong = ", ".join(name for name, fine in zip(values, finite, strict=True) if not fine)
@@ -105,20 +101,12 @@ def is_opaque(scene: SceneTensors) -> bool:
 
 
 def model_of(renderer: str | Model) -> Model:
-    """Return the model of a name, or the model itself.
-
-    Raises:
-        UsageError: there is no such model.
-    """
+    """Return the model of a name, or the model itself."""
     return renderer_of(renderer).default_model if isinstance(renderer, str) else renderer
 
 
 def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewport:
-    """Return the viewport of an image of a canvas; see ``render``.
-
-    Raises:
-        UsageError: a side is not a number of pixels, or the two would stretch the canvas.
-    """
+    """Return the viewport of an image of a canvas; see ``render``."""
     for name, side in (("width", width), ("height", height)):
         is_number = isinstance(side, int) and not isinstance(side, bool)
         if side is not None and not (is_number and 1 <= side <= MOST_SIDE):
