@@ -135,6 +135,16 @@ def test_the_core_imports_no_extension() -> None:
     assert not wrong
 
 
+def test_only_extensions_that_need_torch_import_it() -> None:
+    """It takes seconds."""
+    homes = {
+        module.partition(".")[0]
+        for module, tree in modules().items()
+        if any(within(name, "torch") for name in imported(at_import(tree)))
+    }
+    assert homes <= {"torch", "pydiffvg"}
+
+
 def test_extensions_import_only_those_they_declare() -> None:
     wrong = []
     for module, tree in modules().items():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import torch
 from tests.pydiffvg.helpers import SIZE, blob, group, on_white, psnr, render, scene, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import UsageError
+from warpsplat.pydiffvg import device as first_device
 from warpsplat.pydiffvg.diffvg import FilterType
 from warpsplat.pydiffvg.layout import make_layout
 from warpsplat.pydiffvg.shape import Shape
@@ -30,6 +33,7 @@ def test_area_of_a_circle() -> None:
     image = render([shape], [fill])
     assert image.shape == (SIZE, SIZE, 4)
     assert float(image[..., 3].sum()) == pytest.approx(math.pi * 100, rel=2e-3)
+    assert not render([], []).any()
 
 
 def test_a_scene_of_every_kind_renders_as_its_file(tmp_path: Path) -> None:
@@ -56,7 +60,6 @@ def test_invisible_shapes_change_nothing() -> None:
     shape, fill = circle()
     around, hidden = pydiffvg.Rect(tensor(2, 2), tensor(46, 46)), group(1, tensor(0.9, 0.9, 0.9, 0.0))
     assert torch.allclose(render([shape, around], [fill, hidden]), render([shape], [fill]), atol=1e-6)
-    assert not render([], []).any()
 
 
 def test_seams_of_shapes_that_meet_keep_their_color() -> None:
@@ -224,3 +227,52 @@ def test_opacity_beyond_its_range_has_a_gradient() -> None:
     image[..., 3].sum().backward()
     assert color.grad is not None and float(color.grad[3]) > 100
     assert np.isfinite(color.grad.numpy()).all()
+
+
+def test_what_programs_read_of_the_interface() -> None:
+    assert pydiffvg.RenderFunction.serialize_scene(SIZE, 40, [blob()], [group()])[:2] == [SIZE, 40]
+    assert pydiffvg.device is first_device and isinstance(pydiffvg.device, torch.device)
+    assert pydiffvg.device.type == pydiffvg.get_device().type
+    assert pydiffvg.use_gpu == torch.cuda.is_available()
+
+
+def test_copies_are_scenes_of_their_own() -> None:
+    shapes, groups = [blob()], [group()]
+    shapes[0].points.requires_grad_()
+    copied = copy.deepcopy(shapes), copy.deepcopy(groups)
+    stored = pickle.loads(pickle.dumps((shapes, groups)))
+    copied[0][0].points.data += 3
+    render(*copied).sum().backward()
+    assert copied[0][0].points.grad is not None and shapes[0].points.grad is None
+    assert torch.equal(render(*stored), render(shapes, groups))
+
+
+def test_values_may_change_before_the_backward_pass() -> None:
+    """The gradient is that of the image as it was rendered."""
+    shape = blob()
+    shape.points.requires_grad_()
+    areas = [render([shape], [group()])[..., 3].sum() for _ in range(2)]
+    (before,) = torch.autograd.grad(areas[0], shape.points)
+    shape.points.data.mul_(0.5)
+    (after,) = torch.autograd.grad(areas[1], shape.points)
+    assert torch.equal(before, after)
+
+
+def test_gradients_can_be_zeroed_in_place_and_optimised() -> None:
+    """They are parts of one tensor; only tensors that require a gradient have one."""
+    shapes, groups = scene()
+    trained = [shapes[4].points, groups[0].fill_color, shapes[1].radius]  # type: ignore[union-attr]
+    for value in trained:
+        value.requires_grad_()  # type: ignore[union-attr]
+    optimizer = torch.optim.Adam(trained, lr=0.1)
+    losses = []
+    for _ in range(4):
+        optimizer.zero_grad(set_to_none=False)
+        loss = (render(shapes, groups) - 0.5).square().mean()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses == sorted(losses, reverse=True)
+    assert shapes[0].p_min.grad is None and shapes[3].points.grad is None  # type: ignore[union-attr]
+    with torch.no_grad():
+        assert not render(shapes, groups).requires_grad

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.errors import UsageError
 from warpsplat.extensions import renderer_names
@@ -152,6 +155,13 @@ def test_over() -> None:
     opaque, background = render(SceneTensors.of(scene))[..., :3], torch.tensor(scene.canvas.background)
     torch.testing.assert_close(over(clear, background.tolist()), opaque, rtol=0, atol=1e-5)
     torch.testing.assert_close(over(clear, torch.zeros(36, 40, 3)), clear[..., :3])
+
+
+def test_without_torch_one_line_says_what_to_do() -> None:
+    code = "import sys; sys.modules['torch'] = None; import warpsplat.torch"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
+    assert done.stderr.splitlines()[-1] == message
 
 
 SPLINES, ONES = mixed_scene(seed=1), torch.ones(4, dtype=torch.float32)
