@@ -65,21 +65,17 @@ class Task:
     """False: a superuser, whom permissions do not bind, becomes another user."""
 
 
+@dataclass
 class _ImportTrap(importlib.abc.MetaPathFinder):
     """Call ``on_import`` when ``module`` is imported."""
 
-    def __init__(self, module: str, on_import: Callable[[], None]) -> None:
-        self.module, self.on_import = module, on_import
+    module: str
+    on_import: Callable[[], None]
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> None:
         """Find nothing: the next finder will."""
         if name == self.module:
             self.on_import()
-
-
-def _refuse() -> None:
-    """Fail: PyTorch takes seconds to import, and no command needs it."""
-    raise AssertionError("a command imports torch")
 
 
 def _set_trap(task: Task) -> None:
@@ -147,25 +143,25 @@ def _end(task: Task) -> None:
 
 
 def serve() -> None:
-    """Fork for each task on the standard input, and answer with its exit code."""
+    """Run ``WARM`` in a folder, then fork for each task on the standard input; answer with its exit code."""
     from warpsplat.cli.main import main
 
-    sys.meta_path.insert(0, _ImportTrap("torch", _refuse))
+    sys.modules["torch"] = None  # type: ignore[assignment]  # importing it fails: no command needs it
     tasks, answers = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    folder = Path(sys.argv[1])
+    os.chdir(folder)
+    make_image(folder / "a.png")
+    Path("jobs.yaml").write_text("jobs: [{images: a.png, device: cpu, curves: 4, iterations: 2, output: o}]")
+    for arguments in WARM:
+        with contextlib.suppress(SystemExit):
+            main(list(arguments))
     for line in tasks:
         task = Task(**json.loads(line))
-        if task.stderr == os.devnull:
-            os.chdir(task.folder)
-            with contextlib.suppress(SystemExit):
-                main(task.arguments)
-            code = 0
-        else:
-            child = os.fork()
-            if not child:
-                _end(task)
-            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        print(code, file=answers, flush=True)
+        child = os.fork()
+        if not child:
+            _end(task)
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), file=answers, flush=True)
 
 
 def make_image(path: Path, seed: int = 0) -> None:
@@ -192,19 +188,10 @@ class Forks:
 
     def __init__(self, scratch: Path) -> None:
         self.out, self.err = str(scratch / "stdout"), str(scratch / "stderr")
+        command = [sys.executable, "-m", "tests.forks", str(scratch)]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tests.forks"],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
+            command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        make_image(scratch / "a.png")
-        (scratch / "jobs.yaml").write_text(
-            "jobs: [{images: a.png, device: cpu, curves: 4, iterations: 2, output: o}]"
-        )
-        for arguments in WARM:
-            self._ask(Task(list(arguments), str(scratch), os.devnull, os.devnull))
 
     def close(self) -> None:
         """End the process."""
@@ -214,20 +201,17 @@ class Forks:
     def run(self, arguments: Sequence[str], folder: Path, **how: Any) -> tuple[int, str, str]:
         """Return exit code (or minus the signal that ended it), stdout and stderr; ``how``: see ``Task``."""
         task = Task(list(arguments), str(folder), **{"stdout": self.out, "stderr": self.err, **how})
-        code = self._ask(task)
+        assert self.process.stdin and self.process.stdout
+        print(json.dumps(asdict(task)), file=self.process.stdin, flush=True)
+        code = int(self.process.stdout.readline())
         out, err = (
             "" if n == CLOSED or n.startswith("/dev/") else Path(n).read_text()
             for n in (task.stdout, task.stderr)
         )
         return code, out, err
 
-    def _ask(self, task: Task) -> int:
-        assert self.process.stdin and self.process.stdout
-        print(json.dumps(asdict(task)), file=self.process.stdin, flush=True)
-        return int(self.process.stdout.readline())
-
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:  # one task, from a cold start
+    if sys.argv[1].startswith("{"):  # one task, from a cold start
         run(Task(**json.loads(sys.argv[1])))
     serve()

@@ -6,6 +6,7 @@ Python blocks that are whole programs are marked ``python``; fragments are marke
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 import runpy
 import shlex
@@ -17,10 +18,12 @@ import click
 import pytest
 from PIL import Image
 
+import warpsplat
 from tests import ROOT
 from tests.needs import WHOLE
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
+from warpsplat.run.options import OPTIONS
 from warpsplat.svg.viewer import render_svg
 
 pytestmark = [pytest.mark.usefixtures("single_precision"), WHOLE]
@@ -134,12 +137,30 @@ def test_words_of_the_pages_are_public() -> None:
                 )
 
 
+OTHERWISE = re.compile(r"(?<![-\w`])(?<!zier )(?<!quadratic )(?<!cubic )curves?\b(?![=:`])")
+"""``curve`` in another meaning than that of a piece of an outline, and not as the name of the flag."""
+
+
+def test_one_word_for_one_thing() -> None:
+    """Shapes are no curves (docs/words.md), in what the program says of itself."""
+    found = (cli.get_command(click.Context(cli), name) for name in COMMANDS)
+    texts = [command.get_help(click.Context(command)) for command in found if command]
+    texts += [option.help for option in OPTIONS]
+    for public in ("vectorize", "refine", "render", "load_svg", "save_svg", "score", "Result", "Scene"):
+        texts.append(inspect.getdoc(getattr(warpsplat, public)) or "")
+    for page in ("README.md", "docs/index.md", "docs/tutorial.md", "docs/benchmarks.md"):
+        text = (ROOT / page).read_text("utf-8")
+        texts.append(re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL))
+    for text in texts:
+        plain = re.sub(r"^ *curves: .*$|\{curves\}", "", text, flags=re.MULTILINE)  # settings and arguments
+        assert not [plain[max(0, m.start() - 30) : m.end() + 10] for m in OTHERWISE.finditer(plain)]
+
+
 def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
     """All of them; the script holds its gradient against central differences."""
     runpy.run_path(str(ROOT / "docs" / "figures.py"))["main"](tmp_path)
     kept = ROOT / "docs" / "images" / "how"
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept.iterdir()}
     for path in tmp_path.iterdir():
-        assert (
-            render_svg(path.read_text("utf-8")).size == render_svg((kept / path.name).read_text("utf-8")).size
-        )
+        drawn, committed = (render_svg(each.read_text("utf-8")) for each in (path, kept / path.name))
+        assert drawn.size == committed.size

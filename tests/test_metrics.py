@@ -14,11 +14,17 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import Stopped
-from warpsplat.metrics import SSIMULACRA2_PIXELS, ms_ssim, psnr, score_svg, ssim, ssimulacra2
+from warpsplat.metrics import SSIMULACRA2_PIXELS, Score, ms_ssim, psnr, score_svg, ssim, ssimulacra2
 from warpsplat.scene import Kind
 from warpsplat.svg import strips
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
+
+
+def small_score() -> tuple[str, Score]:
+    """Return a file of five shapes, and its score for what it shows."""
+    text = write_svg(random_scene(Kind.FILL, count=5))
+    return text, score_svg(text, (on_white(render_svg(text)) / 255).astype(np.float32))
 
 
 def test_psnr() -> None:
@@ -31,23 +37,17 @@ def test_psnr() -> None:
 def test_ssim() -> None:
     rng = np.random.default_rng(0)
     a = rng.uniform(0, 255, (32, 32, 3))
-    same = ssim(a, a)
     noisy = ssim(a, np.clip(a + rng.normal(0, 60, a.shape), 0, 255))
-    assert same == pytest.approx(1)
-    assert noisy is not None
-    assert 0.2 < noisy < 0.95
+    assert ssim(a, a) == pytest.approx(1)
+    assert noisy and 0.2 < noisy < 0.95
     assert ssim(a[:11], a[:11]) is None
 
 
 def test_ms_ssim() -> None:
-    rng = np.random.default_rng(0)
-    a = rng.uniform(0, 255, (352, 360, 3))
+    a = np.random.default_rng(0).uniform(0, 255, (352, 360, 3))
     assert ms_ssim(a, a) == pytest.approx(1)
-    blurred = cv2.GaussianBlur(a, (0, 0), 1.0)
-    fine, coarse = ms_ssim(a, blurred), ms_ssim(a, np.clip(a + 40, 0, 255))
-    assert fine is not None
-    assert coarse is not None
-    assert 0.3 < fine < coarse < 1
+    fine, coarse = ms_ssim(a, cv2.GaussianBlur(a, (0, 0), 1.0)), ms_ssim(a, np.clip(a + 40, 0, 255))
+    assert fine and coarse and 0.3 < fine < coarse < 1
     assert ms_ssim(a[:351], a[:351]) is None, "the fifth scale would have 21 rows"
 
 
@@ -57,8 +57,7 @@ def test_white_behind_transparency() -> None:
 
 
 def test_score() -> None:
-    text = write_svg(random_scene(Kind.FILL, count=5))
-    score = score_svg(text, (on_white(render_svg(text)) / 255).astype(np.float32))
+    text, score = small_score()
     assert score.psnr > 60
     assert score.paths == 5
     assert score.bytes == len(text.encode())
@@ -105,26 +104,18 @@ def test_score_in_strips_is_that_of_whole_images(monkeypatch: pytest.MonkeyPatch
         np.testing.assert_allclose([score.psnr, score.ssim, score.ms_ssim], want, atol=tolerance)
 
 
-def test_strips_are_what_is_drawn_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
-    text, _ = scored_scene()
-    whole = strips.draw(text, 371, 357)
-    monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 50)
-    monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
-    in_strips = strips.draw(text, 371, 357)
-    assert np.abs(in_strips.astype(int) - whole).mean() < 0.01
-    # Another program's units need not be pixels: its files are drawn in one piece.
-    foreign = text.replace("<!--warpsplat", "<!--another")
-    np.testing.assert_array_equal(strips.draw(foreign, 371, 357), whole)
-
-
 @pytest.mark.parametrize("per_pixel", [0.5, 1.0, 5.0, 32.0])
 def test_strips_of_any_view_box(per_pixel: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Strips begin where they should for any units: a tenth of a row would be visible."""
+    """Strips begin where they should for any units: a tenth of a row would be visible.
+
+    Another program's units need not be pixels: its files are drawn in one piece.
+    """
     scene = random_scene(Kind.FILL, count=40, width=91, height=157)
     text = write_svg(scene, per_pixel=per_pixel)
     whole = strips.draw(text, 91, 157).astype(int)
     monkeypatch.setattr(strips, "STRIP_PIXELS", 91 * 20)
     monkeypatch.setattr(strips, "WHOLE_PIXELS", 91 * 157 - 1)
+    np.testing.assert_array_equal(strips.draw(text.replace("<!--warpsplat", "<!--another"), 91, 157), whole)
     in_strips = strips.draw(text, 91, 157, own=True).astype(int)
     row = np.abs(np.roll(whole, 1, axis=0) - whole).mean()
     assert np.abs(in_strips - whole).mean() < 0.025 * row
@@ -207,22 +198,18 @@ def test_ssimulacra2_has_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_the_package_ssimulacra2_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ssimulacra2", None)  # makes importing it fail
-    text = write_svg(random_scene(Kind.FILL, count=5))
-    score = score_svg(text, (on_white(render_svg(text)) / 255).astype(np.float32))
-    assert score.ssimulacra2 is None
-    assert score.as_dict()["ssimulacra2"] is None
+    _, score = small_score()
+    assert score.ssimulacra2 is None and score.as_dict()["ssimulacra2"] is None
     assert score.psnr > 60
 
 
-@pytest.mark.parametrize("size", [(64, 48), (65, 48), (64, 49)])
+@pytest.mark.parametrize(("width", "height"), [(64, 48), (65, 48), (64, 49)])
 @pytest.mark.parametrize("channels", [3, 4])
 def test_strips_make_the_figures_of_the_whole(
-    size: tuple[int, int], channels: int, monkeypatch: pytest.MonkeyPatch
+    width: int, height: int, channels: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Channels of large images are computed strip by strip."""
-    width, height = size
-    rng = np.random.default_rng(0)
-    target = rng.uniform(0, 1, (height, width, channels)).astype(np.float32)
+    target = np.random.default_rng(0).uniform(0, 1, (height, width, channels)).astype(np.float32)
     if channels == 4:
         target[..., :3] *= target[..., 3:]
     text = write_svg(random_scene(Kind.FILL, 5, width=width, height=height, seed=1))
