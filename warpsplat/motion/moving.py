@@ -66,7 +66,7 @@ class MovingElement:
 def moving_elements(
     scenes: Sequence[Scene], keys: Sequence[int], tick: float, units: float, static: Callable[[Scene], str]
 ) -> tuple[str, str]:
-    """Return elements that move between the scenes ``keys``, and their style sheet.
+    """Return elements that move between keyframes, and their style sheet.
 
     Args:
         scenes: of the run, as their files show them, with little movement between two.

@@ -22,12 +22,10 @@ EARLY = 1.5
 def showings(moments: Sequence[int], ticks: int, seconds: float) -> dict[int, float]:
     """Return which recorded pictures an animation shows, by index, and how long each [s].
 
-    Late ones are skipped if there are more than ticks.
+    Late ones are skipped if there are more than ``ticks``, equal parts of the animation.
 
-    Args:
-        moments: when the pictures were recorded, as numbers of progress reports, ascending.
-        ticks: equal parts of the animation.
-        seconds: duration.
+    ``moments``: when the pictures were recorded, as numbers of progress reports, ascending; ``seconds``:
+    duration.
     """
     found: dict[int, float] = {}
     for tick in range(ticks if moments else 0):

@@ -51,9 +51,7 @@ class Module(torch.nn.Module):
     ) -> list[dict[str, Any]]:
         """Return an optimiser's parameter groups: each attribute with its learning rate in a run.
 
-        Args:
-            settings: of the run; default: ``Settings()``.
-            rate: factor of all learning rates.
+        ``settings``: of the run, default: ``Settings()``; ``rate``: factor of all learning rates.
         """
         settings = settings or Settings()
         units = Units.of(settings, self._layout.canvas)
