@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import sys
 import tracemalloc
 from dataclasses import replace
@@ -49,11 +50,6 @@ def test_ms_ssim() -> None:
     fine, coarse = ms_ssim(a, cv2.GaussianBlur(a, (0, 0), 1.0)), ms_ssim(a, np.clip(a + 40, 0, 255))
     assert fine and coarse and 0.3 < fine < coarse < 1
     assert ms_ssim(a[:351], a[:351]) is None, "the fifth scale would have 21 rows"
-
-
-def test_white_behind_transparency() -> None:
-    image = Image.new("RGBA", (1, 1), (255, 0, 0, 51))
-    np.testing.assert_allclose(on_white(image)[0, 0], [255, 204, 204])
 
 
 def test_score() -> None:
@@ -134,19 +130,14 @@ def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     text, target = scored_scene()
     monkeypatch.setattr(strips, "STRIP_PIXELS", 371 * 100)
     monkeypatch.setattr(strips, "WHOLE_PIXELS", 0)
-    asked = 0
-
-    def count() -> bool:
-        nonlocal asked
-        asked += 1
-        return False
-
-    score_svg(text, target, eyes=False, stop=count)
+    calls = itertools.count()
+    score_svg(text, target, eyes=False, stop=lambda: next(calls) < 0)
+    asked = next(calls)
     assert asked > 12
     for last in range(1, asked, 5):
-        left = iter(range(last))
+        answers = itertools.chain([False] * (last - 1), itertools.repeat(True))
         with pytest.raises(Stopped):
-            score_svg(text, target, eyes=False, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
+            score_svg(text, target, eyes=False, stop=answers.__next__)
 
 
 def test_memory_of_a_score_is_bounded() -> None:
@@ -154,11 +145,10 @@ def test_memory_of_a_score_is_bounded() -> None:
     text = write_svg(random_scene(Kind.FILL, width=2000, height=1500))
     target = np.zeros((1500, 2000, 3), np.float32)
     tracemalloc.start()
-    try:
-        score_svg(text, target, eyes=False)
-        assert tracemalloc.get_traced_memory()[1] < 30 * 2000 * 1500
-    finally:
-        tracemalloc.stop()
+    score_svg(text, target, eyes=False)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 30 * 2000 * 1500
 
 
 def test_ssimulacra2_is_that_of_the_package(tmp_path: Path) -> None:

@@ -151,15 +151,11 @@ math.log: values = map(math.log, sizes)
 from math: from math import sin
 cmath.rect: cmath.rect(1, x)
 @: a @ b
-@: a @= b
-**: 2 ** y
 **: x ** 0.5
 **: x **= 3
 pow: pow(x, 2)
 np.linalg.solve: np.linalg.solve(a, b)
-np.linalg.norm: np.linalg.norm(a)
 np.linalg.norm: np.linalg.norm(a, 1, axis=0)
-.argsort: np.argsort(a)
 .argsort: a.argsort(kind='quicksort')
 .dot: a.dot(b)
 .normal: rng.normal(size=3)

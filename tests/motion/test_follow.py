@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from tests.scenes import mixed_scene
-from warpsplat.motion.follow import longest_ascending, nearest, track_shapes
+from warpsplat.motion.follow import track_shapes
 from warpsplat.scene import Scene
 
 
@@ -46,16 +45,3 @@ def test_scenes_may_be_empty() -> None:
     numbers, order = track_shapes([empty, scene, empty, scene])
     assert [len(row) for row in numbers] == [0, len(scene), 0, len(scene)]
     assert sorted(order) == list(range(2 * len(scene)))
-
-
-@pytest.mark.parametrize(("values", "length"), [([], 0), ([3, 1, 2], 2), ([5, 0, 6, 1, 7, 2, 3], 4)])
-def test_longest_ascending_parts(values: list[int], length: int) -> None:
-    found = longest_ascending(values)
-    assert len(found) == length and found == sorted(found)
-    assert np.all(np.diff([values[i] for i in found]) > 0)
-
-
-def test_the_nearest_is_the_first_of_several() -> None:
-    rows, others = np.zeros((3, 8), np.float32), np.zeros((4, 8), np.float32)
-    rows[:, 0], others[:, 0] = [0, 1, 5], [7, 0.25, -0.25, 4]
-    assert nearest(rows, others).tolist() == [1, 1, 3]

@@ -21,7 +21,7 @@ from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.fit.settings import Settings
 from warpsplat.metrics import psnr
 from warpsplat.motion import films, recorder
-from warpsplat.motion.timing import HOLD, kept, showings
+from warpsplat.motion.timing import HOLD
 from warpsplat.motion.training import Painter
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Renderer
@@ -137,17 +137,6 @@ def test_the_number_of_scenes_and_bytes_is_limited(monkeypatch: pytest.MonkeyPat
     assert max(np.diff(made.moments)) < 20
     monkeypatch.setattr(recorder, "MAX_BYTES", 10 * recorder._bytes_of(scene))
     assert 5 <= len(recorder_of(scenes[:100]).scenes) <= 10
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 90, 1000])
-@pytest.mark.parametrize("ticks", [2, 75])
-def test_times_add_up(count: int, ticks: int) -> None:
-    moments = list(range(count))
-    found = showings(moments, ticks, 6.0)
-    assert sum(found.values()) == pytest.approx(6)
-    assert list(found) == sorted(found) and max(found) < count
-    chosen = kept(moments, max(ticks, 3))
-    assert (chosen[0], chosen[-1]) == (0, count - 1) and len(chosen) <= max(ticks, 3)
 
 
 @pytest.mark.parametrize(
