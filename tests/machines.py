@@ -3,8 +3,9 @@
 Without options: with each choice of code that NumPy, OpenBLAS, OpenCV and the C library can be told to
 make, and with several numbers of threads. With ``--emulate``: on other processors, by QEMU's user mode
 (``qemu-user`` 10 or newer: 7.2 gathers wrong elements of strided arrays with AVX2), which takes minutes for
-the first case, as the kernels are compiled there too. An aarch64 needs its own Python and packages, which
-``--prepare FOLDER`` fetches (Debian, pip) and ``--aarch64 FOLDER`` uses.
+the first case, as the kernels are compiled there too. ``--aarch64 FOLDER``: on an aarch64 too, whose Python
+(Debian's packages, unpacked by ``dpkg -x``) is in FOLDER/root, and the packages that warpsplat needs (by
+``pip install --platform manylinux2014_aarch64 --target``) in FOLDER/site.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from importlib import metadata
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from tests import ROOT
 from tests.golden.__main__ import EXPECTED
@@ -27,24 +27,11 @@ from tests.golden.cases import CASES
 EMULATED_CASES = ("photo closed", "photo open", "photo splat", "drawing", "line", "pixel")
 """Cases made under emulation where none are named; all take hours."""
 
-PACKAGES = """
-python3.11-minimal libpython3.11-minimal libpython3.11-stdlib libc6 libgcc-s1 libstdc++6 zlib1g libexpat1
-libffi8 libssl3 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libncursesw6 libtinfo6 libreadline8 libdb5.3
-libnsl2 libtirpc3 libcrypt1 media-types
-"""
-"""Debian's packages of a Python for aarch64."""
 
-WHEELS = """
-warp-lang numpy opencv-contrib-python-headless pillow click pyyaml resvg-py jinja2 markupsafe
-"""
-"""Python packages that warpsplat needs there."""
-
-
-@dataclass(frozen=True)
-class Machine:
+class Machine(NamedTuple):
     """A way to run Python."""
 
-    environment: dict[str, str] = field(default_factory=dict)
+    environment: Mapping[str, str] = {}
     python: Sequence[str] = (sys.executable,)
     threads: int = 1
     kernels: str = "kernels"
@@ -77,31 +64,14 @@ EMULATED = {
 
 
 def aarch64(folder: Path) -> Machine:
-    """Return the machine that ``prepare`` made in ``folder``."""
-    python = folder / "root" / "usr" / "bin" / "python3.11"
+    """Return the machine whose Python is in ``folder``."""
+    root = folder / "root"
     return Machine(
         {"PYTHONPATH": str(folder / "site")},
-        ("qemu-aarch64", "-L", str(folder / "root"), str(python)),
+        ("qemu-aarch64", "-L", str(root), str(root / "usr" / "bin" / "python3.11")),
         kernels="aarch64-kernels",
         left_out=("refined",),  # starts Python for an SVG of unknown origin, which is not emulated
     )
-
-
-def prepare(folder: Path) -> None:
-    """Fetch a Python for aarch64 and the packages that warpsplat needs, in the versions installed here."""
-    debs = folder / "debs"
-    debs.mkdir(parents=True, exist_ok=True)
-    subprocess.run(["dpkg", "--add-architecture", "arm64"], check=True)
-    subprocess.run(["apt-get", "-qq", "update"], check=True)
-    names = [f"{name}:arm64" for name in PACKAGES.split()]
-    subprocess.run(["apt-get", "-qq", "download", *names], check=True, cwd=debs)
-    for deb in sorted(debs.glob("*.deb")):
-        subprocess.run(["dpkg", "-x", str(deb), str(folder / "root")], check=True)
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--only-binary=:all:"]
-    target = ["--python-version=3.11", "--platform=manylinux2014_aarch64", f"--target={folder / 'site'}"]
-    platforms = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (36, 35, 34, 31, 28, 27, 17)]
-    wanted = [f"{name}=={metadata.version(name)}" for name in WHEELS.split()]
-    subprocess.run([*pip, *platforms, *target, *wanted], check=True)
 
 
 def made_on(machine: Machine, cases: Sequence[str]) -> dict[str, str]:
@@ -122,12 +92,8 @@ def main() -> int:
     parser.add_argument("cases", nargs="*", help="names of golden cases; default: all, or some if emulated")
     parser.add_argument("--emulate", action="store_true", help="other processors, by QEMU")
     parser.add_argument("--aarch64", type=Path, metavar="FOLDER", help="where its Python is")
-    parser.add_argument("--prepare", type=Path, metavar="FOLDER", help="fetch a Python for aarch64, and stop")
     parser.add_argument("--only", metavar="NAME", help="one machine")
     given = parser.parse_args()
-    if given.prepare:
-        prepare(given.prepare)
-        return 0
     machines = EMULATED if given.emulate or given.aarch64 else CONFIGURED
     if given.aarch64:
         machines = {**machines, "aarch64": aarch64(given.aarch64)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 import subprocess
 import sys
 import threading
@@ -54,11 +53,9 @@ def test_grey_and_bits_are_images(device: str) -> None:
     grey = photograph()[..., 0]
     wanted = warpsplat.vectorize(np.repeat(grey[..., None], 3, axis=2), device=device, **QUICK).svg
     assert warpsplat.vectorize(grey, device=device, **QUICK).svg == wanted
-    deep = grey.astype(np.uint16) * 257
-    assert warpsplat.vectorize(deep, device=device, **QUICK).svg == wanted
-    bits = grey > 127
-    black = warpsplat.vectorize(np.uint8(255) * bits, device=device, **QUICK).svg
-    assert warpsplat.vectorize(bits, device=device, **QUICK).svg == black
+    assert warpsplat.vectorize(grey.astype(np.uint16) * 257, device=device, **QUICK).svg == wanted
+    black = warpsplat.vectorize(np.uint8(255) * (grey > 127), device=device, **QUICK).svg
+    assert warpsplat.vectorize(grey > 127, device=device, **QUICK).svg == black
 
 
 @pytest.mark.parametrize(
@@ -86,14 +83,12 @@ def test_another_thing_is_refused() -> None:
         warpsplat.load_svg(1.0)
 
 
-def test_unknown_keywords_are_refused_with_the_nearest() -> None:
-    for name, words in (
-        ("colour", "'colour'; did you mean 'colors'?"),
-        ("outptu", "'output'"),
-        ("xing", "'xing'"),
-    ):
-        with pytest.raises(TypeError, match=rf"^vectorize\(\) has no keyword .*{re.escape(words)}"):
-            warpsplat.vectorize(photograph(), **{name: 3})
+@pytest.mark.parametrize(
+    ("name", "more"), [("colour", "; did you mean 'colors'?"), ("outptu", ".*'output'"), ("xing", "")]
+)
+def test_unknown_keywords_are_refused_with_the_nearest(name: str, more: str) -> None:
+    with pytest.raises(TypeError, match=rf"^vectorize\(\) has no keyword '{name}'{more}"):
+        warpsplat.vectorize(photograph(), **{name: 3})
 
 
 def test_settings_and_their_values_exclude_each_other() -> None:
@@ -200,10 +195,8 @@ def test_a_scene_to_start_from(device: str) -> None:
     fills, strokes = (warpsplat.starting_scene(photograph(), 20, open=is_open) for is_open in (False, True))
     assert len(fills) == len(strokes) == 20
     assert (strokes.kind == Kind.STROKE).all()
-    wanted = photograph() / 255
-    shown = warpsplat.render(fills, device=device)[..., :3]
-    blank = ((wanted - wanted.mean(axis=(0, 1))) ** 2).mean()
-    assert ((shown - wanted) ** 2).mean() < 0.7 * blank
+    wanted, shown = photograph() / 255, warpsplat.render(fills, device=device)[..., :3]
+    assert ((shown - wanted) ** 2).mean() < 0.7 * ((wanted - wanted.mean(axis=(0, 1))) ** 2).mean()
 
 
 def test_an_svg_is_refined(device: str) -> None:
@@ -211,9 +204,7 @@ def test_an_svg_is_refined(device: str) -> None:
     wanted = np.full((32, 40, 3), 255, np.uint8)
     wanted[5:27, 6:33] = 40
     result = warpsplat.refine(text, wanted, device=device)
-    assert result.before is not None
-    assert result.score
-    assert result.score.psnr > result.before + 5
+    assert result.score and result.before and result.score.psnr > result.before + 5
     assert result.history
     assert result.score == warpsplat.score(result.svg, wanted)
 

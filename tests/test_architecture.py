@@ -49,19 +49,7 @@ ANYWHERE = {"", "_version", "extensions"}
 
 EXTENSIONS = extensions.folders()
 
-HEAVY = {
-    "numpy",
-    "warp",
-    "torch",
-    "cv2",
-    "PIL",
-    "resvg_py",
-    "svgelements",
-    "scipy",
-    "jinja2",
-    "starlette",
-    "uvicorn",
-}
+HEAVY = {*("numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "scipy", "jinja2", "starlette", "uvicorn")}
 """What the command line imports only when a command runs: ``--help`` answers at once."""
 
 
@@ -70,12 +58,10 @@ def modules() -> dict[str, ast.Module]:
     """The package's modules by name without ``warpsplat.``; the package itself is ``""``."""
     found = {}
     for folder, _, files in os.walk(ROOT / "warpsplat", followlinks=True):
-        for file in files:
-            if file.endswith(".py"):
-                path = Path(folder, file)
-                parts = path.relative_to(ROOT / "warpsplat").with_suffix("").parts
-                name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-                found[name] = ast.parse(path.read_text(encoding="utf-8"))
+        for path in (Path(folder, file) for file in files if file.endswith(".py")):
+            parts = path.relative_to(ROOT / "warpsplat").with_suffix("").parts
+            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+            found[name] = ast.parse(path.read_text(encoding="utf-8"))
     return found
 
 
@@ -125,24 +111,23 @@ def extension_of(module: str) -> str | None:
 
 def test_the_core_imports_no_extension() -> None:
     """The package's ``__init__`` names some for type checkers, and loads them through the registry."""
-    wrong = [
-        f"{module} imports {other}"
-        for module, tree in modules().items()
-        if module and not extension_of(module)
-        for other in own(imported(ast.walk(tree)))
-        if extension_of(other)
-    ]
-    assert not wrong
+    for module, tree in modules().items():
+        others = own(imported(ast.walk(tree)))
+        assert extension_of(module) or not (module and any(map(extension_of, others))), module
+
+
+def test_only_extensions_that_need_torch_import_it() -> None:
+    """It takes seconds."""
+    for module, tree in modules().items():
+        imports_it = any(within(name, "torch") for name in imported(at_import(tree)))
+        assert not imports_it or extension_of(module) in {"torch", "pydiffvg"}, module
 
 
 def test_extensions_import_only_those_they_declare() -> None:
-    wrong = []
     for module, tree in modules().items():
         if name := extension_of(module):
             allowed = {name, None, *EXTENSIONS[name].requires, *EXTENSIONS[name].uses}
-            others = own(imported(ast.walk(tree)))
-            wrong += [f"{module} imports {other}" for other in others if extension_of(other) not in allowed]
-    assert not wrong
+            assert {*map(extension_of, own(imported(ast.walk(tree))))} <= allowed, module
 
 
 def test_imports_in_the_core_point_one_way() -> None:
@@ -203,49 +188,35 @@ IN, OUT = "# In:", "# Out:"
 SHAPE = re.compile(r"\[[^\[\]]+\]")
 
 
-def is_kernel(node: ast.AST) -> bool:
-    return isinstance(node, ast.FunctionDef) and any(
-        ast.unparse(decorator).startswith("wp.kernel") for decorator in node.decorator_list
-    )
-
-
-def kernels() -> dict[str, tuple[ast.FunctionDef, list[str]]]:
-    """Each kernel with the lines of its file."""
-    found = {}
+def decorated(decorator: str) -> Iterator[tuple[str, ast.FunctionDef, list[str]]]:
+    """Yield kernels or functions: their name, the function, and the lines of its file."""
     for path in KERNEL_FILES:
         text = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.FunctionDef) and is_kernel(node):
-                name = f"{path.relative_to(ROOT).with_suffix('')}.{node.name}"
-                found[name] = (node, text.splitlines())
-    return found
+            if isinstance(node, ast.FunctionDef) and any(
+                ast.unparse(each).startswith(decorator) for each in node.decorator_list
+            ):
+                yield f"{path.relative_to(ROOT).with_suffix('')}.{node.name}", node, text.splitlines()
 
 
-KERNELS = kernels()
+KERNELS = {name: (node, lines) for name, node, lines in decorated("wp.kernel")}
+FUNCTIONS = {node.name: node for _, node, _ in decorated("wp.func")}
 by_kernel = pytest.mark.parametrize(("kernel", "lines"), KERNELS.values(), ids=KERNELS.keys())
 
 
-def marker(kernel: ast.FunctionDef, lines: list[str], text: str) -> int:
-    """The line (from 1) of a marker in the signature."""
-    rows = range(kernel.lineno, kernel.body[0].lineno)
-    (found,) = [row for row in rows if lines[row - 1].strip() == text]
-    return found
-
-
-def parts(kernel: ast.FunctionDef, lines: list[str]) -> tuple[list[ast.arg], list[ast.arg]]:
-    """Parameters under In and under Out."""
-    out = marker(kernel, lines, OUT)
-    given = kernel.args.args
-    return [a for a in given if a.lineno < out], [a for a in given if a.lineno > out]
+def output_names(kernel: ast.FunctionDef, lines: list[str]) -> set[str]:
+    """Return the parameters under Out."""
+    (out,) = [row for row in range(kernel.lineno, kernel.body[0].lineno) if lines[row - 1].strip() == OUT]
+    return {argument.arg for argument in kernel.args.args if argument.lineno > out}
 
 
 @by_kernel
 def test_signatures(kernel: ast.FunctionDef, lines: list[str]) -> None:
     """``offset`` first, inputs before outputs, the shape at each array."""
-    inputs, outputs = parts(kernel, lines)
+    outputs = output_names(kernel, lines)
     assert kernel.args.args[0].arg == "offset"
-    assert marker(kernel, lines, IN) == kernel.args.args[0].lineno - 1
-    assert inputs and outputs
+    assert lines[kernel.args.args[0].lineno - 2].strip() == IN
+    assert outputs
     for argument in kernel.args.args:
         assert argument.annotation is not None
         kind = ast.unparse(argument.annotation)
@@ -253,7 +224,7 @@ def test_signatures(kernel: ast.FunctionDef, lines: list[str]) -> None:
             end = lines[(argument.end_lineno or 0) - 1]
             assert SHAPE.search(end.partition("#")[2]), f"{argument.arg}: no shape"
         else:
-            assert argument in inputs, f"{argument.arg}: a number cannot be written to"
+            assert argument.arg not in outputs, f"{argument.arg}: a number cannot be written to"
     assert ast.get_docstring(kernel)
 
 
@@ -290,33 +261,18 @@ def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
     return {name for name in names if name.partition(".")[0] in parameters}
 
 
-FUNCTIONS = {
-    node.name: node
-    for path in KERNEL_FILES
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    if isinstance(node, ast.FunctionDef) and "wp.func" in map(ast.unparse, node.decorator_list)
-}
-
-
 @by_kernel
 def test_what_is_written_is_an_output(kernel: ast.FunctionDef, lines: list[str]) -> None:
-    inputs, outputs = parts(kernel, lines)
-    stored = written(kernel, {a.arg for a in kernel.args.args})
-    assert not stored & {a.arg for a in inputs}
-    assert stored == {a.arg for a in outputs}, "an output that nothing is written to"
+    assert written(kernel, {a.arg for a in kernel.args.args}) == output_names(kernel, lines)
 
 
 def test_kernels_are_launched_by_name_only() -> None:
     """``Program.launch`` binds parameters by their names; Warp's own launch goes by position."""
-    homes = []
-    launches = 0
-    for module, tree in modules().items():
-        if "kernels" in module.split("."):
-            continue
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                name = ast.unparse(node.func)
-                homes += [module] if name in {"wp.launch", "wp.launch_tiled", "warp.launch"} else []
-                launches += name == "program.launch"
+    homes = [
+        module
+        for module, tree in modules().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) in {"wp.launch", "wp.launch_tiled", "warp.launch"}
+    ]
     assert homes == ["rendering.program"]
-    assert launches > 25

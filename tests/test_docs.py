@@ -5,7 +5,7 @@ Python blocks that are whole programs are marked ``python``; fragments are marke
 
 from __future__ import annotations
 
-import importlib
+import inspect
 import re
 import runpy
 import shlex
@@ -17,10 +17,12 @@ import click
 import pytest
 from PIL import Image
 
+import warpsplat
 from tests import ROOT
 from tests.needs import WHOLE
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
+from warpsplat.run.options import OPTIONS
 from warpsplat.svg.viewer import render_svg
 
 pytestmark = [pytest.mark.usefixtures("single_precision"), WHOLE]
@@ -32,9 +34,6 @@ PHOTOGRAPHS = ("photo.jpg", "cat.jpg", CAT)
 
 SMALL = (72, 64)
 """Pixels that it is reduced to, so that blocks are quick."""
-
-NEEDED = {"warpsplat.torch": "torch"}
-"""Optional packages that parts of the library need."""
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -69,9 +68,8 @@ def test_python_runs(page: Path, folder: Path) -> None:
     """Run the blocks of a page in order."""
     names: dict[str, object] = {"__name__": "__main__"}
     for number, block in enumerate(blocks(page, "python")):
-        for module, needs in NEEDED.items():
-            if module in block:
-                pytest.importorskip(needs)
+        if "warpsplat.torch" in block:
+            pytest.importorskip("torch")
         exec(compile(block, f"{page.name}, block {number}", "exec"), names)
 
 
@@ -125,13 +123,30 @@ MADE = {"architecture.md", "changelog.md", "contributing.md", "commands.md", "ga
 
 def test_words_of_the_pages_are_public() -> None:
     """Python blocks use public names only."""
+    public = {*warpsplat.__all__, "torch", "pydiffvg", "errors", "scene"}
     for page in PAGES:
         for block in blocks(page, "python"):
-            for name in re.findall(r"\bwarpsplat\.(\w+)", re.sub(r"[\"'].*?[\"']", "", block)):
-                public = importlib.import_module("warpsplat").__all__
-                assert name in {*public, "torch", "pydiffvg", "errors", "scene"}, (
-                    f"{page.name}: warpsplat.{name}"
-                )
+            names = re.findall(r"\bwarpsplat\.(\w+)", re.sub(r"[\"'].*?[\"']", "", block))
+            assert {*names} <= public, page.name
+
+
+OTHERWISE = re.compile(r"(?<![-\w`])(?<!zier )(?<!quadratic )(?<!cubic )curves?\b(?![=:`])")
+"""``curve`` in another meaning than that of a piece of an outline, and not as the name of the flag."""
+
+
+def test_one_word_for_one_thing() -> None:
+    """Shapes are no curves (docs/words.md), in what the program says of itself."""
+    found = (cli.get_command(click.Context(cli), name) for name in COMMANDS)
+    texts = [command.get_help(click.Context(command)) for command in found if command]
+    texts += [option.help for option in OPTIONS]
+    for public in ("vectorize", "refine", "render", "load_svg", "save_svg", "score", "Result", "Scene"):
+        texts.append(inspect.getdoc(getattr(warpsplat, public)) or "")
+    for page in ("README.md", "docs/index.md", "docs/tutorial.md", "docs/benchmarks.md"):
+        text = (ROOT / page).read_text("utf-8")
+        texts.append(re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL))
+    for text in texts:
+        plain = re.sub(r"^ *curves: .*$|\{curves\}", "", text, flags=re.MULTILINE)  # settings and arguments
+        assert not [plain[max(0, m.start() - 30) : m.end() + 10] for m in OTHERWISE.finditer(plain)]
 
 
 def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
@@ -140,6 +155,5 @@ def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
     kept = ROOT / "docs" / "images" / "how"
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept.iterdir()}
     for path in tmp_path.iterdir():
-        assert (
-            render_svg(path.read_text("utf-8")).size == render_svg((kept / path.name).read_text("utf-8")).size
-        )
+        drawn, committed = (render_svg(each.read_text("utf-8")) for each in (path, kept / path.name))
+        assert drawn.size == committed.size

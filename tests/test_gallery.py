@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import json
 import shlex
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import click
 import pytest
@@ -30,11 +27,6 @@ pytestmark = [
     ),
 ]
 
-MOST_BYTES = 5_000_000
-"""Most that the gallery's files take together."""
-LONGEST = 512
-"""Side of an image [px]."""
-
 
 @pytest.fixture(scope="module")
 def gallery() -> Iterator[ModuleType]:
@@ -44,23 +36,10 @@ def gallery() -> Iterator[ModuleType]:
     sys.path.remove(str(DOCS))
 
 
-@pytest.fixture(scope="module")
-def listed(gallery: ModuleType) -> tuple[Any, ...]:
-    found: tuple[Any, ...] = gallery.entries()
-    return found
-
-
-def test_there_are_a_dozen_of_each_subject(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
-    for subject in gallery.SUBJECTS:
-        assert sum(entry.subject == subject for entry in listed) >= 12
-    assert len({entry.name for entry in listed}) == len(listed)
-
-
-def test_each_image_has_an_author_a_licence_and_a_source(
-    gallery: ModuleType, listed: tuple[Any, ...]
-) -> None:
-    known = gallery.licences()
+def test_each_image_has_an_author_a_licence_and_a_source(gallery: ModuleType) -> None:
+    known, listed = gallery.licences(), gallery.entries()
     notices = (gallery.FOLDER / "NOTICES.txt").read_text("utf-8")
+    assert len({entry.name for entry in listed}) == len(listed)
     for entry in listed:
         assert entry.title and entry.what and entry.author and entry.package
         assert entry.licence in known
@@ -68,39 +47,34 @@ def test_each_image_has_an_author_a_licence_and_a_source(
         assert (path in notices) == (entry.licence == "MIT")
 
 
-def test_images_are_small_and_no_file_is_without_an_entry(
-    gallery: ModuleType, listed: tuple[Any, ...]
-) -> None:
+def test_images_are_small_and_no_file_is_without_an_entry(gallery: ModuleType) -> None:
+    listed = gallery.entries()
     for entry in listed:
         with Image.open(entry.image) as image:
-            assert max(image.size) <= LONGEST, entry.name
+            assert max(image.size) <= 512, entry.name
     files = {path for folder in ("images", "records") for path in (gallery.FOLDER / folder).rglob("*.*")}
     assert files == {path for entry in listed for path in (entry.image, entry.svg, entry.record)}
-    assert sum(path.stat().st_size for path in files) < MOST_BYTES
+    assert sum(path.stat().st_size for path in files) < 5_000_000
 
 
-def test_records_belong_to_the_files(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
-    for entry in listed:
+def test_records_belong_to_the_files(gallery: ModuleType) -> None:
+    for entry in gallery.entries():
         record = entry.figures()
         svg = entry.svg.read_bytes()
         made_of = {**entry.inputs(), "svg": gallery.digest(svg)}
         assert {key: record["made_of"][key] for key in made_of} == made_of, entry.name
         assert record["bytes"] == len(svg)
         assert record["shapes"] > 0
+        assert record["subject"] == entry.subject, entry.name
         lengths = {len(column) for column in record["history"].values()}
         assert len(lengths) == 1 and max(lengths) <= gallery.MOST_POINTS
         inspect_svg(svg.decode())
 
 
-def test_subjects_are_what_the_gallery_shows(listed: tuple[Any, ...]) -> None:
-    for entry in listed:
-        assert entry.figures()["subject"] == entry.subject, entry.name
-
-
-def test_commands_say_the_settings(gallery: ModuleType, listed: tuple[Any, ...]) -> None:
+def test_commands_say_the_settings(gallery: ModuleType) -> None:
     command = cli.get_command(click.Context(cli), "vectorize")
     assert command
-    for entry in listed:
+    for entry in gallery.entries():
         _, name, image, *words = shlex.split(entry.command)
         assert (name, image) == ("vectorize", entry.image.name)
         given = command.make_context("vectorize", [str(entry.image), *words]).params
@@ -109,33 +83,3 @@ def test_commands_say_the_settings(gallery: ModuleType, listed: tuple[Any, ...])
                 assert given["kind"] == KINDS[key], entry.name
             else:
                 assert given[key] == type(given[key])(value), (entry.name, key)
-
-
-def test_what_is_up_to_date(gallery: ModuleType, tmp_path: Path) -> None:
-    folder = tmp_path / "gallery"
-    image = folder / "images" / "photo" / "dot.png"
-    image.parent.mkdir(parents=True)
-    Image.new("RGB", (8, 8), "red").save(image)
-    words = {"subject": "photo", "name": "dot", "title": "a", "what": "b", "author": "c", "licence": "MIT"}
-    entry = gallery.Entry(**words, package="d", settings={"curves": 4}, folder=folder)
-    assert not gallery.is_current(entry, "code")
-    entry.svg.write_text("<svg/>")
-    entry.record.parent.mkdir(parents=True)
-    made_of = {**entry.inputs(), "code": "code", "svg": gallery.digest(b"<svg/>")}
-    entry.record.write_text(json.dumps({"made_of": made_of}))
-    assert gallery.is_current(entry, "code")
-    assert not gallery.is_current(entry, "other code")
-    others = gallery.Entry(**words, package="d", settings={"curves": 5}, folder=folder)
-    assert not gallery.is_current(others, "code")
-    entry.svg.write_text("<svg></svg>")
-    assert not gallery.is_current(entry, "code")
-
-
-def test_a_command_in_words(gallery: ModuleType, tmp_path: Path) -> None:
-    image = tmp_path / "images" / "line" / "a b.png"
-    image.parent.mkdir(parents=True)
-    image.touch()
-    settings = {"max_bytes": "1KB", "mixed": True, "background": "#fff"}
-    words = {"title": "", "what": "", "author": "", "licence": "", "package": ""}
-    entry = gallery.Entry("line", "a b", settings=settings, folder=tmp_path, **words)
-    assert entry.command == "warpsplat vectorize 'a b.png' --max-bytes 1KB --mixed --background '#fff'"

@@ -16,17 +16,15 @@ import tempfile
 import venv
 from pathlib import Path
 
-import numpy as np
-from PIL import Image
-
 from tests import ROOT
+from tests.forks import make_image
 from tests.needs import WORDS
 
 
 def copy_without(extension: str, target: Path) -> None:
     """Copy what git would keep, but for the extension's folders."""
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
+    names = subprocess.check_output(listed, cwd=ROOT, text=True).split("\0")
     folders = (f"warpsplat/{extension}/", f"tests/{extension}/")
     for name in names:
         if name and not name.startswith(folders) and os.path.lexists(ROOT / name):
@@ -40,7 +38,7 @@ def installed(checkout: Path, environment: Path) -> Path:
     programs = environment / ("Scripts" if os.name == "nt" else "bin")
     python = programs / "python"
     where = [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
-    purelib = Path(subprocess.run(where, check=True, capture_output=True, text=True).stdout.strip())
+    purelib = Path(subprocess.check_output(where, text=True).strip())
     (purelib / "outer.pth").write_text("\n".join(site.getsitepackages()), encoding="utf-8")
     options = ["--quiet", "--no-index", "--no-deps", "--no-build-isolation", "--ignore-installed"]
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check", "install"]
@@ -58,9 +56,7 @@ def main() -> None:
         folder, checkout = Path(name), Path(name, "checkout")
         copy_without(given.extension, checkout)
         programs = installed(checkout, folder / "environment")
-        Image.fromarray(np.random.default_rng(0).integers(0, 255, (24, 32, 3), np.uint8)).save(
-            folder / "noise.png"
-        )
+        make_image(folder / "noise.png")
         vectorize = ["vectorize", "noise.png", "--curves", "4", "--iterations", "10", "--device", "cpu"]
         for command in ([programs / "warpsplat", *vectorize], [programs / "warpsplat", "--help"]):
             subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)

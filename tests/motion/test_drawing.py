@@ -17,23 +17,17 @@ TWO_STROKES = (
 )
 
 
-def dark(image: np.ndarray) -> np.ndarray:
-    """Columns of dark pixels in the rows of the two strokes and of the fill."""
-    return (image[[10, 20, 31], :, 0] < 128).sum(axis=1)
-
-
 def test_strokes_grow_one_after_the_other() -> None:
     """Times are proportional to lengths; a fill takes as long as the mean stroke."""
-    frames = [
-        on_white(picture) for picture, _ in drawing.film(TWO_STROKES, Path("a.webp"), 48, 3.0, own=True)
-    ]
-    found = np.array([dark(frame) for frame in frames])
+    film = drawing.film(TWO_STROKES, Path("a.webp"), 48, 3.0, own=True)
+    frames = [on_white(picture) for picture, _ in film]
+    # Columns of dark pixels in the rows of the two strokes and of the fill.
+    found = np.array([(frame[[10, 20, 31], :, 0] < 128).sum(axis=1) for frame in frames])
     assert np.all(np.diff(found, axis=0) >= 0)
     assert found[-1] == pytest.approx([30, 10, 10], abs=1)
-    halfway = found[len(found) // 2 - 1]  # of three equal times, the strokes have two, 3:1
-    assert halfway == pytest.approx([30, 0, 0], abs=1)
-    third = found[round(len(found) / 4)]
-    assert third[0] == pytest.approx(15, abs=2.5)
+    # Of three equal times, the strokes have two, 3:1.
+    assert found[len(found) // 2 - 1] == pytest.approx([30, 0, 0], abs=1)
+    assert found[round(len(found) / 4), 0] == pytest.approx(15, abs=2.5)
     assert np.array_equal(frames[-1], on_white(render_own(TWO_STROKES)))
     assert (frames[0] > 250).mean() > 0.98, "the background is there from the beginning"
 

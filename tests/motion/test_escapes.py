@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from warpsplat.motion.escapes import half_blocks, iterm, kitty, picture_escapes, sixels
+from warpsplat.motion.escapes import half_blocks, kitty, picture_escapes, sixels
 from warpsplat.motion.terminal import Terminal
 
 
@@ -105,16 +105,16 @@ def test_kitty() -> None:
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(packed))), image)
 
 
-def test_iterm() -> None:
+@pytest.mark.parametrize("tmux", [False, True])
+def test_iterm(tmux: bool) -> None:
+    """Sequences are wrapped for tmux."""
     image = picture(20, 10)
-    text = iterm(Image.fromarray(image), 4, 1)
+    text = picture_escapes(Terminal("iterm", 20, 10, (10, 20), tmux=tmux), image, 4, 1, 1)
+    if tmux:
+        assert text.startswith("\x1bPtmux;\x1b") and text.endswith("\x1b\\")
+        text = text[len("\x1bPtmux;\x1b") : -len("\x1b\\")]
     found = re.fullmatch(r"\x1b\]1337;File=inline=1;size=(\d+);width=4;height=1;[^:]*:([^\x07]*)\x07", text)
     assert found
     packed = base64.b64decode(found[2], validate=True)
     assert len(packed) == int(found[1])
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(packed))), image)
-
-
-def test_tmux_gets_wrapped_sequences() -> None:
-    text = picture_escapes(Terminal("iterm", 20, 10, (10, 20), tmux=True), picture(100, 60), 10, 3, 1)
-    assert text.startswith("\x1bPtmux;\x1b\x1b]1337;File=") and text.endswith("\x07\x1b\\")

@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from tests.scenes import mixed_scene
-from warpsplat.motion.follow import longest_ascending, nearest, track_shapes
+from warpsplat.motion.follow import track_shapes
 from warpsplat.scene import Scene
 
 
 def later(scene: Scene, keep: list[int], new: Scene) -> Scene:
     """Return the scene a densification and some steps later."""
     moved = scene.take(np.array(keep))
-    rng = np.random.default_rng(0)
-    points = moved.points + rng.normal(0, 0.3, moved.points.shape).astype(np.float32)
+    points = moved.points + np.random.default_rng(0).normal(0, 0.3, moved.points.shape).astype(np.float32)
     return replace(moved, points=points).append(new)
 
 
@@ -25,39 +24,24 @@ def test_shapes_are_tracked_through_densification() -> None:
     count = len(first)
     second = later(first, [i for i in range(count) if i != 2], other.take(np.array([0])))
     third = later(second, list(range(1, count)), other.take(np.array([3])))
-    found = track_shapes([first, second, third])
-    assert found.numbers[1].tolist() == [0, 1, *range(3, count), count]
-    assert found.numbers[2].tolist() == [1, *range(3, count), count, count + 1]
-    place = {number: i for i, number in enumerate(found.order)}
-    assert sorted(place) == list(range(count + 2))
-    assert all((np.diff([place[n] for n in numbers]) > 0).all() for numbers in found.numbers)
+    numbers, order = track_shapes([first, second, third])
+    assert numbers[1].tolist() == [0, 1, *range(3, count), count]
+    assert numbers[2].tolist() == [1, *range(3, count), count, count + 1]
+    assert sorted(order) == list(range(count + 2))
+    assert all((np.diff([order.index(n) for n in row]) > 0).all() for row in numbers)
 
 
 def test_a_shape_that_changes_depth_is_another_one() -> None:
     """Otherwise no order would fit both scenes."""
     scene = mixed_scene()
-    turned = scene.take(np.roll(np.arange(len(scene)), 1))
-    found = track_shapes([scene, turned])
-    assert found.numbers[1].tolist() == [len(scene), *range(len(scene) - 1)]
-    assert found.order[0] == len(scene)
+    numbers, order = track_shapes([scene, scene.take(np.roll(np.arange(len(scene)), 1))])
+    assert numbers[1].tolist() == [len(scene), *range(len(scene) - 1)]
+    assert order[0] == len(scene)
 
 
 def test_scenes_may_be_empty() -> None:
     scene = mixed_scene()
     empty = scene.take(np.arange(0))
-    found = track_shapes([empty, scene, empty, scene])
-    assert [len(numbers) for numbers in found.numbers] == [0, len(scene), 0, len(scene)]
-    assert sorted(found.order) == list(range(2 * len(scene)))
-
-
-def test_longest_ascending_parts() -> None:
-    for values, length in (([], 0), ([3, 1, 2], 2), ([5, 0, 6, 1, 7, 2, 3], 4)):
-        found = longest_ascending(values)
-        assert len(found) == length and found == sorted(found)
-        assert np.all(np.diff([values[i] for i in found]) > 0)
-
-
-def test_the_nearest_is_the_first_of_several() -> None:
-    rows, others = np.zeros((3, 8), np.float32), np.zeros((4, 8), np.float32)
-    rows[:, 0], others[:, 0] = [0, 1, 5], [7, 0.25, -0.25, 4]
-    assert nearest(rows, others).tolist() == [1, 1, 3]
+    numbers, order = track_shapes([empty, scene, empty, scene])
+    assert [len(row) for row in numbers] == [0, len(scene), 0, len(scene)]
+    assert sorted(order) == list(range(2 * len(scene)))

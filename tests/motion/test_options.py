@@ -69,19 +69,13 @@ def test_refine(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (
-            ["--animate", "a.avi"],
-            "a.avi: not an animation format; the name must end in .svg, .gif, .webp or .mp4",
-        ),
+        (["--animate", "a.avi"], "a.avi: not an animation format; the name must end in {endings}"),
         (["--animate", "-"], "an animation cannot be written to the standard output: give --animate FILE"),
         (["--animate", "a.svg"], "a.svg: is another file of this run; give another name"),
         (["--animate", "there.gif/a.gif"], "there.gif/a.gif: {here}/there.gif is not a folder"),
         (["--animate", "a.gif", "--animate-width", "9"], "an animation is 16 to 2048 px wide, not 9"),
         (["--animate-what", "drawing"], "--animate-what and --animate-width need --animate FILE"),
-        (
-            ["--animate", "there.gif"],
-            "there.gif: exists and was not written by warpsplat; --overwrite replaces it",
-        ),
+        (["--animate", "there.gif"], "there.gif: exists and was not written by warpsplat; {overwrite}"),
         (["photo.png", "--animate", "a.gif"], "--animate takes one image"),
         (["photo.png", "--preview"], "--preview takes one image"),
     ],
@@ -97,7 +91,9 @@ def test_errors_come_before_the_run(
     Path("there.gif").write_bytes(b"GIF89a of somebody else")
     before = sorted(image.parent.iterdir())
     assert run("vectorize", image.name, "-o", "a.svg", *options) == 2
-    assert one_line(capsys.readouterr().err) == "warpsplat: " + message.replace("{here}", str(image.parent))
+    words = {"endings": ".svg, .gif, .webp or .mp4", "overwrite": "--overwrite replaces it"}
+    message = message.format(here=image.parent, **words)
+    assert one_line(capsys.readouterr().err) == f"warpsplat: {message}"
     assert sorted(image.parent.iterdir()) == before
 
 
@@ -107,11 +103,10 @@ def test_notice_without_a_terminal(
     """An image may follow the flag; stdout has only the SVG."""
     assert run("vectorize", "--preview", image, "-o", "-", *QUICK) == 0
     captured = capfdbinary.readouterr()
-    lines = captured.err.decode().splitlines()
-    assert lines[0] == (
-        "warpsplat: --preview: stderr is not a terminal that shows pictures; --preview=blocks prints them"
+    assert captured.err.startswith(
+        b"warpsplat: --preview: stderr is not a terminal that shows pictures; --preview=blocks prints them\n"
     )
-    assert captured.out.startswith(b"<svg") and len(lines) == 2
+    assert captured.out.startswith(b"<svg") and captured.err.count(b"\n") == 2
 
 
 def test_an_encoding_without_half_blocks(

@@ -16,11 +16,12 @@ from warpsplat.motion.terminal import BLOCK_CELL, Protocol, Terminal
 from warpsplat.scene import FloatArray
 
 COLUMNS, LINES = 60, 12
+ROWS = LINES - 4
 RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 
 
 class Screen(io.StringIO):
-    """Characters with colours, a cursor, and the lines that have scrolled away."""
+    """Rows of characters with their colours, of which the last ``LINES`` are visible; and a cursor."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -28,29 +29,21 @@ class Screen(io.StringIO):
         self.row = self.column = 0
         self.saved = (0, 0)
         self.style = ""
-        self.gone: list[dict[int, tuple[str, str]]] = []
 
     def write(self, text: str) -> int:
         for escape, character in re.findall(r"(\x1b\[[\d;?]*[A-Za-z]|\x1b[78])|([\s\S])", text):
             if escape:
                 self._do(escape)
             elif character == "\n":
-                self._next_line()
+                self.row, self.column = self.row + 1, 0  # as terminals' line discipline has it
+                self.cells += [{}] * (self.row == len(self.cells))
             elif character == "\r":
                 self.column = 0
             else:
                 assert self.column < COLUMNS, "a line that is too long"
-                self.cells[self.row][self.column] = (character, self.style)
+                self.cells[self.row] = self.cells[self.row] | {self.column: (character, self.style)}
                 self.column += 1
         return len(text)
-
-    def _next_line(self) -> None:
-        self.column = 0  # as terminals' line discipline has it
-        self.row += 1
-        if self.row == LINES:
-            self.gone.append(self.cells.pop(0))
-            self.cells.append({})
-            self.row -= 1
 
     def _do(self, escape: str) -> None:
         number = int(re.sub(r"\D", "", escape) or 1)
@@ -59,10 +52,10 @@ class Screen(io.StringIO):
         elif escape == "\x1b8":
             self.row, self.column = self.saved
         elif escape[-1] == "A":
-            assert self.row >= number, "above the screen"
             self.row -= number
+            assert self.row >= len(self.cells) - LINES, "above the screen"
         elif escape[-1] == "B":
-            self.row = min(self.row + number, LINES - 1)
+            self.row = min(self.row + number, len(self.cells) - 1)
         elif escape == "\x1b[2K":
             self.cells[self.row] = {}
         else:
@@ -70,29 +63,35 @@ class Screen(io.StringIO):
             self.style = "" if escape == "\x1b[0m" else escape
 
     def text(self, row: int) -> str:
-        """The characters of a row, counted from the first one ever."""
-        line = (self.gone + self.cells)[row]
-        return "".join(line.get(x, (" ", ""))[0] for x in range(COLUMNS)).rstrip()
+        """Return the characters of a row, counted from the first one ever."""
+        return "".join(self.cells[row].get(x, (" ", ""))[0] for x in range(COLUMNS)).rstrip()
 
     def pictures(self) -> list[str]:
-        """The colours at the beginning of each row of a picture."""
-        return [line[0][1] for line in self.gone + self.cells if line.get(0, ("", ""))[0] == "▀"]
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
+        """Return the colours at the beginning of each row of a picture."""
+        return [line[0][1] for line in self.cells if line.get(0, ("", ""))[0] == "▀"]
 
 
 def flat(color: tuple[int, int, int]) -> FloatArray:
     return np.full((12, 18, 3), np.array(color) / 255, np.float32)
 
 
-def progress(image: FloatArray) -> Progress:
-    return Progress(1, 2, 20.0, 0.0, 0.5, True, 3, Snapshot(mixed_scene, lambda: image))
+class Shown:
+    """A preview on ``screen`` with a clock and a terminal that tests set."""
+
+    def __init__(self, screen: io.StringIO, **others: object) -> None:
+        self.now = 100.0
+        self.terminal = replace(Terminal("blocks", COLUMNS, LINES, BLOCK_CELL), **others)
+        self.preview = Preview(screen, lambda: self.terminal, lambda: self.now)
+
+    def update(self, color: tuple[int, int, int], seconds: float = 10.0, draws: float = 0.0) -> None:
+        """Update; then ``seconds`` pass, and ``draws`` within."""
+
+        def image() -> FloatArray:
+            self.now += draws
+            return flat(color)
+
+        self.preview.update(Progress(1, 2, 20.0, 0.0, 0.5, True, 3, Snapshot(mixed_scene, image)))
+        self.now += seconds
 
 
 @pytest.fixture
@@ -100,73 +99,56 @@ def screen() -> Screen:
     return Screen()
 
 
-def preview(screen: io.StringIO, clock: Clock, **others: object) -> tuple[Preview, list[Terminal]]:
-    """A preview, and the list whose last entry it takes for the terminal."""
-    terminals = [replace(Terminal("blocks", COLUMNS, LINES, BLOCK_CELL), **others)]
-    return Preview(screen, lambda: terminals[-1], clock), terminals
-
-
 def test_pictures_replace_each_other_above_the_bar(screen: Screen) -> None:
     """The finished one stands beside its source."""
-    clock = Clock()
-    shown, _ = preview(screen, clock)
+    shown = Shown(screen)
     screen.write("before\n")
     for color in (RED, BLUE):
-        shown.update(progress(flat(color)))
+        shown.update(color)
         screen.write(f"\rbar {color[0]:3}")
-        clock.now += 10
-    rows = LINES - 4
-    assert [screen.text(row)[:1] for row in range(1, 1 + rows)] == ["▀"] * rows
-    assert screen.text(0) == "before" and screen.text(1 + rows) == "bar   0"
-    assert len(screen.pictures()) == rows and all("0;0;255" in style for style in screen.pictures())
+    assert [screen.text(row)[:1] for row in range(1, 1 + ROWS)] == ["▀"] * ROWS
+    assert screen.text(0) == "before" and screen.text(1 + ROWS) == "bar   0"
+    assert len(screen.pictures()) == ROWS and all("0;0;255" in style for style in screen.pictures())
     assert not screen.style, "colours end with the line"
-    shown.finish(flat(GREEN), flat(BLUE))
+    shown.preview.finish(flat(GREEN), flat(BLUE))
     screen.write(" done\n")
-    assert len(screen.pictures()) == rows and "0;0;255" in screen.pictures()[0]
-    assert screen.text(1).startswith("▀" * 24) and screen.text(1 + rows) == "bar   0 done"
-    assert "0;255;0" in (screen.gone + screen.cells)[1][24 + 1 + 3][1]
+    assert len(screen.pictures()) == ROWS and "0;0;255" in screen.pictures()[0]
+    assert screen.text(1).startswith("▀" * 24) and screen.text(1 + ROWS) == "bar   0 done"
+    assert "0;255;0" in screen.cells[1][24 + 1 + 3][1]
 
 
 def test_lines_below_the_picture_stay(screen: Screen) -> None:
-    shown, _ = preview(screen, clock := Clock())
-    shown.update(progress(flat(RED)))
+    shown = Shown(screen)
+    shown.update(RED)
     screen.write("\rnotice\n")
-    shown.move_on()
-    clock.now += 10
-    shown.update(progress(flat(BLUE)))
-    assert screen.text(LINES - 4) == "notice" and screen.text(LINES - 3)[0] == "▀"
+    shown.preview.move_on()
+    shown.update(BLUE)
+    assert screen.text(ROWS) == "notice" and screen.text(ROWS + 1)[0] == "▀"
 
 
 def test_a_resized_terminal_gets_a_new_picture(screen: Screen) -> None:
-    shown, terminals = preview(screen, clock := Clock())
-    for terminal, color in ((terminals[0], RED), (Terminal("blocks", 20, 10, BLOCK_CELL), BLUE)):
-        terminals.append(terminal)
-        shown.update(progress(flat(color)))
-        clock.now += 10
-    assert sum("255;0;0" in style for style in screen.pictures()) == LINES - 4
+    shown = Shown(screen)
+    shown.update(RED)
+    shown.terminal = Terminal("blocks", 20, 10, BLOCK_CELL)
+    shown.update(BLUE)
+    assert sum("255;0;0" in style for style in screen.pictures()) == ROWS
     assert sum("0;0;255" in style for style in screen.pictures()) == 10 - 4
     before = screen.pictures()
-    terminals.append(Terminal("blocks", 5, 2, BLOCK_CELL))
-    shown.update(progress(flat(GREEN)))
+    shown.terminal = Terminal("blocks", 5, 2, BLOCK_CELL)
+    shown.update(GREEN)
     assert screen.pictures() == before, "too small for a picture"
 
 
 def test_drawing_takes_a_small_part_of_the_time() -> None:
     """The interval depends on the last two costs; the first update and a single slow one do not count."""
-    clock, drawn = Clock(), []
-    shown, _ = preview(io.StringIO(), clock)
-    costs = iter([2.0, 0.1, 0.1, 5.0, *[0.1] * 1000])
-
-    def slow() -> FloatArray:
-        clock.now += next(costs)
-        drawn.append(clock.now)
-        return flat(RED)
-
-    began = clock.now
-    now = replace(progress(flat(RED)), snapshot=Snapshot(mixed_scene, slow))
-    while clock.now < began + 200:
-        shown.update(now)
-        clock.now += 0.01
+    shown, drawn = Shown(io.StringIO()), []
+    costs = [2.0, 0.1, 0.1, 5.0, *[0.1] * 1000]
+    while shown.now < 300:
+        before = shown.now
+        shown.update(RED, 0.0, costs[len(drawn)])
+        if shown.now > before:
+            drawn.append(shown.now)
+        shown.now += 0.01
     gaps = np.diff(drawn)
     assert gaps[0] < 1.2 and gaps[[1, 3]] == pytest.approx(0.1 / TIME_SHARE, abs=0.05)
     assert 90 < len(drawn) < 110
@@ -174,29 +156,27 @@ def test_drawing_takes_a_small_part_of_the_time() -> None:
 
 def test_a_pipe_gets_the_finished_picture_only() -> None:
     out = io.StringIO()
-    shown, _ = preview(out, Clock(), live=False)
-    shown.update(progress(flat(RED)))
+    shown = Shown(out, live=False)
+    shown.update(RED)
     assert not out.getvalue()
-    shown.finish(flat(RED), None)
+    shown.preview.finish(flat(RED), None)
     lines = out.getvalue().split("\n")
-    assert len(lines) == LINES - 4 + 1 and not lines[-1]
+    assert len(lines) == ROWS + 1 and not lines[-1]
     assert not re.search(r"\x1b(?!\[[\d;]*m)|\r", out.getvalue()), "colours, but no cursor movements"
     out.close()
-    shown.finish(flat(RED), None)  # a closed stream is ignored
+    shown.preview.finish(flat(RED), None)  # a closed stream is ignored
 
 
-@pytest.mark.parametrize("protocol", ["kitty", "iterm", "sixel"])
-def test_pixel_protocols_draw_in_the_same_place(protocol: str) -> None:
+@pytest.mark.parametrize(("protocol", "end"), [("kitty", "\x1b\\"), ("iterm", "\x07"), ("sixel", "\x1b\\")])
+def test_pixel_protocols_draw_in_the_same_place(protocol: str, end: str) -> None:
     out = io.StringIO()
-    shown, _ = preview(out, clock := Clock(), protocol=protocol, cell=(10, 20))
-    for color in (RED, BLUE):
-        shown.update(progress(flat(color)))
-        clock.now += 10
-    first, second = (part for part in out.getvalue().split("\x1b7") if "\x1b8" in part)
-    rows = LINES - 4
-    assert out.getvalue().startswith("\r\x1b[2K" + rows * "\n" + "\x1b7")
-    assert first.startswith(f"\r\x1b[{rows}A\x1b") and second.startswith(f"\r\x1b[{rows}A\x1b")
-    assert first.endswith("\x1b\\\x1b8" if protocol != "iterm" else "\x07\x1b8")
+    shown = Shown(out, protocol=protocol, cell=(10, 20))
+    shown.update(RED)
+    shown.update(BLUE)
+    begin, *pictures = out.getvalue().split("\x1b7")
+    assert begin == "\r\x1b[2K" + ROWS * "\n" and len(pictures) == 2
+    for picture in pictures:
+        assert picture.startswith(f"\r\x1b[{ROWS}A\x1b") and picture.endswith(f"{end}\x1b8")
     if protocol == "kitty":
         numbers = re.findall(r"i=(\d+)", out.getvalue())
         assert len(numbers) == 2 and len(set(numbers)) == 1, "so the second replaces the first"
@@ -214,11 +194,10 @@ def test_pictures_fit_in_their_proportions(
     across, down = size[0] * cell[0], size[1] * cell[1]
     assert protocol != "sixel" or max(across, down) <= 800
     zoom = min(across / width, down / height)
-    for side, shown, unit in ((width, across, cell[0]), (height, down, cell[1])):
-        assert abs(side * zoom - shown) <= unit * (1 + side / min(width, height))
+    for side, drawn, unit in ((width, across, cell[0]), (height, down, cell[1])):
+        assert abs(side * zoom - drawn) <= unit * (1 + side / min(width, height))
 
 
 def test_transparency_is_white() -> None:
-    image = np.zeros((4, 4, 4), np.float32)
-    image[..., 1], image[..., 3] = 0.25, 0.5  # premultiplied
-    assert np.array_equal(np.unique(resized(image, 4, 4).reshape(-1, 3), axis=0), [[128, 191, 128]])
+    image = np.full((4, 4, 4), (0, 0.25, 0, 0.5), np.float32)  # premultiplied
+    assert (resized(image, 4, 4) == (128, 191, 128)).all()

@@ -14,15 +14,29 @@ from PIL import Image
 
 from tests.scenes import mixed_scene, with_gradients
 from warpsplat import Canvas, Recorder, Result, Scene, UsageError
+from warpsplat.errors import CapacityError
 from warpsplat.files.output import may_replace
+from warpsplat.fit.export import export
 from warpsplat.fit.progress import Progress, Snapshot
+from warpsplat.fit.settings import Settings
 from warpsplat.metrics import psnr
 from warpsplat.motion import films, recorder
-from warpsplat.motion.timing import HOLD, kept, showings
+from warpsplat.motion.timing import HOLD
+from warpsplat.motion.training import Painter
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene.geometry import enlarged
-from warpsplat.svg.viewer import on_white, render_own, render_svg
+from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
+from warpsplat.svg.write import GRIDS
 
 Recorded = tuple[Recorder, Result]
+FLAT = mixed_scene(48, 36)
+CLEAR = replace(FLAT, canvas=Canvas(48, 36, None))
+
+
+@pytest.fixture
+def no_video(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(films, "VIDEO_PACKAGE", "no_such_package")
 
 
 def frames_of(path: Path) -> tuple[list[np.ndarray], float]:
@@ -43,11 +57,6 @@ def frames_of(path: Path) -> tuple[list[np.ndarray], float]:
     return pictures, seconds
 
 
-def shown(svg: str, width: int) -> np.ndarray:
-    image = render_svg(svg, zoom=width / 48)
-    return on_white(image)
-
-
 @pytest.mark.parametrize("what", ["training", "drawing"])
 @pytest.mark.parametrize("ending", ["gif", "webp", "mp4"])
 def test_a_film_ends_with_the_file(
@@ -60,7 +69,7 @@ def test_a_film_ends_with_the_file(
     pictures, seconds = frames_of(path)
     assert seconds == pytest.approx(1 + HOLD, abs=0.15)
     assert {picture.shape for picture in pictures} == {(48, 64, 3)}
-    end = shown(result.svg, 64)
+    end = on_white(render_svg(result.svg, zoom=64 / 48))
     assert psnr(pictures[-1], end) > 28
     assert psnr(pictures[0], end) < psnr(pictures[len(pictures) // 4], end) < psnr(pictures[-1], end)
     assert may_replace(path)
@@ -87,28 +96,25 @@ def test_an_animated_svg_shows_the_file_where_nothing_is_animated(recorded: Reco
 
 def test_translucent_shapes_are_not_seen_twice(recorded: Recorded, tmp_path: Path) -> None:
     """Without a background, the file replaces the last shapes at once."""
-    scene = replace(mixed_scene(48, 36), canvas=Canvas(48, 36, None))
-    made = Recorder()
-    snapshots(made, [scene, scene, scene])
-    made.save(tmp_path / "a.svg", replace(recorded[1], scene=scene), seconds=2)
+    made = recorder_of([CLEAR] * 3)
+    made.save(tmp_path / "a.svg", replace(recorded[1], scene=CLEAR), seconds=2)
     text = (tmp_path / "a.svg").read_text()
     assert "animation:m 2s}" in text and "animation:e 0s 2s backwards" in text
 
 
-def snapshots(made: Recorder, scenes: list[Scene]) -> None:
-    image = np.zeros((4, 4, 3), np.float32)
+def recorder_of(scenes: list[Scene]) -> Recorder:
+    made, image = Recorder(), np.zeros((4, 4, 3), np.float32)
     for step, scene in enumerate(scenes):
         now = Snapshot(functools.partial(replace, scene), lambda: image)
         made(Progress(step, len(scenes), 20.0, 0.0, 0.0, True, len(scene), now))
+    return made
 
 
 def test_gradients_have_unique_ids(recorded: Recorded, tmp_path: Path) -> None:
     """A run on a reduced image fills the picture."""
-    scene = with_gradients(mixed_scene(48, 36))
+    scene = with_gradients(FLAT)
     small = replace(enlarged(scene, 1, 24, 18), points=scene.points / 2, frames=scene.frames / 2)
-    made = Recorder()
-    snapshots(made, [small, scene, scene])
-    made.save(tmp_path / "a.svg", replace(recorded[1], scene=scene))
+    recorder_of([small, scene, scene]).save(tmp_path / "a.svg", replace(recorded[1], scene=scene))
     text = (tmp_path / "a.svg").read_text()
     names = re.findall(r'\bid="([^"]*)"', text)
     assert len(names) > 3 and len(names) == len(set(names))
@@ -122,8 +128,7 @@ def test_the_number_of_scenes_and_bytes_is_limited(monkeypatch: pytest.MonkeyPat
     scene = mixed_scene()
     scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
     monkeypatch.setattr(recorder, "MAX_SCENES", 60)
-    made = Recorder()
-    snapshots(made, scenes)
+    made = recorder_of(scenes)
     assert 30 < len(made.scenes) <= 60
     assert [int(scene.widths[0]) for scene in made.scenes] == made.moments
     assert (made.moments[0], made.moments[-1]) == (0, 249)
@@ -131,21 +136,7 @@ def test_the_number_of_scenes_and_bytes_is_limited(monkeypatch: pytest.MonkeyPat
     assert early > later
     assert max(np.diff(made.moments)) < 20
     monkeypatch.setattr(recorder, "MAX_BYTES", 10 * recorder._bytes_of(scene))
-    made = Recorder()
-    snapshots(made, scenes[:100])
-    assert 5 <= len(made.scenes) <= 10
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 90, 1000])
-@pytest.mark.parametrize("ticks", [2, 75])
-def test_times_add_up(count: int, ticks: int) -> None:
-    moments = list(range(count))
-    found = showings(moments, ticks, 6.0)
-    assert sum(showing.seconds for showing in found) == pytest.approx(6)
-    indices = [showing.index for showing in found]
-    assert indices == sorted(set(indices)) and max(indices) < count
-    chosen = kept(moments, max(ticks, 3))
-    assert (chosen[0], chosen[-1]) == (0, count - 1) and len(chosen) <= max(ticks, 3)
+    assert 5 <= len(recorder_of(scenes[:100]).scenes) <= 10
 
 
 @pytest.mark.parametrize(
@@ -158,15 +149,8 @@ def test_times_add_up(count: int, ticks: int) -> None:
         ("a.mp4", {}, "pip install no_such_package, or warpsplat with its extra"),
     ],
 )
-def test_errors(
-    recorded: Recorded,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    options: dict[str, Any],
-    message: str,
-) -> None:
-    monkeypatch.setattr(films, "VIDEO_PACKAGE", "no_such_package")
+@pytest.mark.usefixtures("no_video")
+def test_errors(recorded: Recorded, tmp_path: Path, name: str, options: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
         recorded[0].save(tmp_path / name, recorded[1], **options)
     assert not list(tmp_path.iterdir())
@@ -181,3 +165,39 @@ def test_default_subject(recorded: Recorded, tmp_path: Path) -> None:
     assert not empty.scenes and empty.shows(result) == "drawing"
     with pytest.raises(UsageError, match="there is no training to show"):
         empty.save(tmp_path / "a.gif", result, what="training")
+
+
+@pytest.mark.parametrize("size", [(40_000, 2), (2, 40_000), (10, 1000), (1, 1), (640, 480)])
+@pytest.mark.parametrize("width", [None, 16, 2048])
+def test_sides_of_films(size: tuple[int, int], width: int | None) -> None:
+    """The shorter one keeps a pixel, unless the longer one would be longer than films can be."""
+    zoom = films.zoom_of(Path("a.webp"), size, width)
+    picture = Image.new("RGB", (max(1, int(size[0] * zoom)), max(1, int(size[1] * zoom))))
+    assert films.encoded(Path("a.webp"), [(picture, 1.0)])[:4] == b"RIFF"
+    assert max(size) == 40_000 or min(size) * zoom >= 1 - 1e-9
+    assert size != (640, 480) or not width or zoom == width / 640
+
+
+def viewer_psnr(scene: Scene, settings: Settings) -> float:
+    """Compare a painted scene with its file in a viewer."""
+    painted = Painter(Backend.on("cpu", 1), settings, (96, 72)).paint(scene, 2.0)
+    seen = render_svg(export(scene, settings, GRIDS[-1]), zoom=2.0)
+    assert painted.size == (96, 72)
+    return psnr(premultiplied(painted), premultiplied(seen))
+
+
+@pytest.mark.parametrize("renderer", ["exact", "splat", "gaussian"])
+@pytest.mark.parametrize("scene", [FLAT, with_gradients(FLAT), CLEAR], ids=["flat", "gradients", "clear"])
+def test_frames_look_as_a_viewer_shows_the_file(renderer: str, scene: Scene) -> None:
+    assert viewer_psnr(scene, Settings(renderer=renderer)) > 36, "39.9 to 42.8 dB over five scenes"
+
+
+def test_a_viewer_draws_what_the_renderer_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Too many shapes, and none."""
+
+    def refuses(*_: object) -> None:
+        raise CapacityError("too many")
+
+    monkeypatch.setattr(Renderer, "grow", refuses)
+    for scene in (FLAT, FLAT.take(np.arange(0))):
+        assert viewer_psnr(scene, Settings()) > 45

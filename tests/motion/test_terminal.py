@@ -11,10 +11,13 @@ import subprocess
 import sys
 import termios
 import threading
+from collections.abc import Callable
 
 import pytest
 
-from warpsplat.motion.terminal import BLOCK_CELL, DEFAULT_CELL, detect
+from warpsplat.motion.terminal import BLOCK_CELL, DEFAULT_CELL, Protocol, Terminal, detect
+
+Detect = Callable[..., Terminal | None]
 
 
 class Tty(io.StringIO):
@@ -26,6 +29,22 @@ def never() -> str:
     raise AssertionError("asked")
 
 
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> Detect:
+    """``detect`` with these environment variables, by default on a terminal that must not be asked."""
+
+    def detected(
+        environ: dict[str, str],
+        protocol: Protocol | None = None,
+        stream: io.StringIO | None = None,
+        ask: Callable[[], str] = never,
+    ) -> Terminal | None:
+        monkeypatch.setattr(os, "environ", {"TERM": "xterm-256color"} | environ)
+        return detect(stream or Tty(), protocol, ask)
+
+    return detected
+
+
 @pytest.mark.parametrize(
     ("environ", "protocol"),
     [
@@ -33,15 +52,15 @@ def never() -> str:
         ({"KITTY_WINDOW_ID": "1"}, "kitty"),
         ({"TERM_PROGRAM": "ghostty"}, "kitty"),
         ({"TERM_PROGRAM": "iTerm.app"}, "iterm"),
-        ({"TERM_PROGRAM": "WezTerm"}, "iterm"),
         ({"LC_TERMINAL": "iTerm2"}, "iterm"),
         ({"TERM": "tmux-256color", "TMUX": "/tmp/x", "KITTY_WINDOW_ID": "1"}, "blocks"),
         ({"TERM": "screen", "TERM_PROGRAM": "iTerm.app"}, "blocks"),
     ],
 )
-def test_protocol_by_environment(environ: dict[str, str], protocol: str) -> None:
-    found = detect(Tty(), None, {"TERM": "xterm-256color"} | environ, never)
-    assert found and found.protocol == protocol and found.live and found.tmux == ("TMUX" in environ)
+def test_protocol_by_environment(environ: dict[str, str], protocol: str, found: Detect) -> None:
+    terminal = found(environ)
+    assert terminal and terminal.protocol == protocol and terminal.live
+    assert terminal.tmux == ("TMUX" in environ)
 
 
 @pytest.mark.parametrize(
@@ -53,39 +72,32 @@ def test_protocol_by_environment(environ: dict[str, str], protocol: str) -> None
         ("", "blocks", BLOCK_CELL),
     ],
 )
-def test_protocol_by_answer(answer: str, protocol: str, cell: tuple[int, int]) -> None:
-    found = detect(Tty(), None, {"TERM": "xterm-256color"}, lambda: answer)
-    assert found and (found.protocol, found.cell) == (protocol, cell)
+def test_protocol_by_answer(answer: str, protocol: str, cell: tuple[int, int], found: Detect) -> None:
+    terminal = found({}, ask=lambda: answer)
+    assert terminal and (terminal.protocol, terminal.cell) == (protocol, cell)
 
 
-def test_a_given_protocol_needs_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "33")
-    monkeypatch.setenv("LINES", "11")
-    found = detect(io.StringIO(), "blocks", {"TERM": "screen"}, never)
-    assert found and (found.columns, found.lines, found.live, found.true_color) == (33, 11, False, True)
-    assert detect(io.StringIO(), None, {"TERM": "xterm-kitty"}, never) is None
-    assert detect(Tty(), None, {"TERM": "dumb"}, never) is None
+def test_a_given_protocol_needs_no_terminal(found: Detect) -> None:
+    terminal = found({"COLUMNS": "33", "LINES": "11", "TERM": "screen"}, "blocks", io.StringIO())
+    assert terminal and (terminal.columns, terminal.lines) == (33, 11)
+    assert (terminal.live, terminal.true_color) == (False, True)
+    assert found({"TERM": "xterm-kitty"}, stream=io.StringIO()) is None
+    assert found({"TERM": "dumb"}) is None
 
 
 @pytest.mark.parametrize(
-    ("environ", "true_color"),
-    [
-        ({"COLORTERM": "truecolor"}, True),
-        ({"TERM": "xterm-direct"}, True),
-        ({"WT_SESSION": "1"}, True),
-        ({}, False),
-    ],
+    "environ", [{"COLORTERM": "truecolor"}, {"TERM": "xterm-direct"}, {"WT_SESSION": "1"}, {}]
 )
-def test_colors(environ: dict[str, str], true_color: bool) -> None:
-    found = detect(Tty(), "blocks", {"TERM": "xterm-256color"} | environ, never)
-    assert found and found.true_color == true_color
+def test_colors(environ: dict[str, str], found: Detect) -> None:
+    terminal = found(environ, "blocks")
+    assert terminal and terminal.true_color == bool(environ)
 
 
 def test_current_size() -> None:
     primary, secondary = pty.openpty()
     with os.fdopen(secondary, "w") as stream, os.fdopen(primary, "rb"):
         fcntl.ioctl(primary, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 900, 600))
-        found = detect(stream, "sixel", {}, never)
+        found = detect(stream, "sixel", never)
         assert found and (found.columns, found.lines, found.cell) == (100, 30, (9, 20))
         fcntl.ioctl(primary, termios.TIOCSWINSZ, struct.pack("HHHH", 10, 50, 0, 0))
         now = found.remeasured(stream)
@@ -116,9 +128,8 @@ def test_asking_a_terminal(answers: bool) -> None:
 
     def answer() -> None:
         asked.append(os.read(primary, 100))
-        if answers:
-            os.write(primary, b"\x1b[6;20;10t\x1b[?62;4")
-            os.write(primary, b";22c")
+        for part in (b"\x1b[6;20;10t\x1b[?62;4", b";22c") * answers:
+            os.write(primary, part)
 
     thread = threading.Thread(target=answer)
     thread.start()

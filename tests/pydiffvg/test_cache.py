@@ -7,18 +7,17 @@ from collections.abc import Callable
 import pytest
 import torch
 
-from tests.pydiffvg.helpers import SIZE, scene, tensor
+from tests.pydiffvg.helpers import SIZE, group, scene, tensor
 from warpsplat import pydiffvg
-from warpsplat.pydiffvg import cache
-from warpsplat.pydiffvg.arguments import SceneArguments, serialize
+from warpsplat.pydiffvg.arguments import SceneArguments, serialize, serialize_cached
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 
 CPU = torch.device("cpu")
 Scene = tuple[list[Shape], list[ShapeGroup]]
 
 
-def cached(shapes: list[Shape], groups: list[ShapeGroup]) -> SceneArguments:
-    return cache.serialize_cached(SIZE, SIZE, shapes, groups, CPU)
+def cached(shapes: list[Shape], groups: list[ShapeGroup], height: int = SIZE) -> SceneArguments:
+    return serialize_cached(SIZE, height, shapes, groups, CPU)
 
 
 def are_alike(one: SceneArguments, other: SceneArguments) -> bool:
@@ -32,7 +31,7 @@ def test_a_scene_that_stays_is_serialized_once() -> None:
     with torch.no_grad():
         shapes[4].points += 1  # type: ignore[union-attr]  # a path
     assert cached(list(shapes), list(groups)) is first
-    assert cache.serialize_cached(SIZE, 2 * SIZE, shapes, groups, CPU).height == 2 * SIZE
+    assert cached(shapes, groups, 2 * SIZE).height == 2 * SIZE
 
 
 def _set(owner: Callable[[Scene], object], name: str, value: object) -> Callable[[Scene], None]:
@@ -83,10 +82,7 @@ def test_copies_and_results_are_made_again(kind: str) -> None:
     """Tensors of another type are copied; the graph of a computed one can be used only once."""
     values = tensor([[4, 4], [40, 5], [22, 40]])
     values = values.double() if kind == "double" else values.requires_grad_() * 1.0
-    made: Scene = (
-        [pydiffvg.Polygon(values, True)],
-        [pydiffvg.ShapeGroup(torch.tensor([0]), tensor(1, 0, 0, 1))],
-    )
+    made: Scene = [pydiffvg.Polygon(values, True)], [group()]
     first = cached(*made)
     with torch.no_grad():
         values += 3

@@ -71,10 +71,7 @@ RECT = '<rect width="9" height="9" fill="url(#g)"/>'
     ("body", "cause"),
     [
         ("<text>a</text>", "uses <text>"),
-        (
-            f'<linearGradient id="g" spreadMethod="repeat">{STOPS}</linearGradient>{RECT}',
-            "spreadMethod repeat",
-        ),
+        (f'<linearGradient id="g" spreadMethod="repeat">{STOPS}</linearGradient>{RECT}', "Method repeat"),
         (f'<radialGradient id="g" fx=".2">{STOPS}</radialGradient>{RECT}', "focus"),
     ],
 )

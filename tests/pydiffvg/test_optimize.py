@@ -66,11 +66,13 @@ def test_a_rotation_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize("mode", MODES)
 def test_every_mode_starts_at_the_transform(mode: str) -> None:
     settings = pydiffvg.SvgOptimizationSettings.default_params["transforms"] | {"transform_mode": mode}
-    rotated, sheared = (
-        [[0.6, -0.8, 3], [0.8, 0.6, -2], [0, 0, 1]],
-        [[1.2, 0.3, 3], [-0.5, 0.7, -2], [0, 0, 1]],
+    rotated, sheared, mirrored = (
+        [[0.6, -0.8, 3], [0.8, 0.6, -2]],
+        [[1.2, 0.3, 3], [-0.5, 0.7, -2]],
+        [[2, 0, 1], [0, -2, 5]],
     )
-    for matrix in map(tensor, (rotated, sheared, [[2, 0, 1], [0, -2, 5], [0, 0, 1]])):
+    for rows in (rotated, sheared, mirrored):
+        matrix = tensor([*rows, [0, 0, 1]])
         assert torch.allclose(OptimizableTransform(matrix, settings)(), matrix, atol=1e-5)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import runpy
 import sys
@@ -38,18 +37,14 @@ def cat(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
-def example(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def run(name: str, *arguments: Any, **named: Any) -> Any:
+    """Run an example, and return what it returns."""
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](*arguments, **named)
 
 
 @pytest.mark.parametrize("name", ["own_loss", "painterly", "masked_strokes"])
 def test_an_image_is_fitted(name: str, cat: str, tmp_path: Path) -> None:
-    losses = example(name).main(cat, str(tmp_path / "a.svg"), STEPS, curves=CURVES)
+    losses = run(name, cat, str(tmp_path / "a.svg"), STEPS, curves=CURVES)
     assert len(losses) == STEPS
     assert losses[-1] < 0.95 * losses[0], "0.86 at most over five seeds"
     assert warpsplat.load_svg(tmp_path / "a.svg").canvas.width == 48
@@ -61,7 +56,7 @@ def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
     white = np.zeros((height, width), np.uint8)
     white[4:, 4 : width // 2 + 1] = 255
     cv2.imwrite(str(mask), white)
-    example("masked_strokes").main(cat, str(tmp_path / "a.svg"), 40, str(mask))
+    run("masked_strokes", cat, str(tmp_path / "a.svg"), 40, str(mask))
     opacity = warpsplat.render(tmp_path / "a.svg")[..., 3]
     assert opacity[6:-6, 8 : width // 2 - 4].mean() > 0.5
     assert opacity[:, width // 2 + 6 :].mean() < 0.1
@@ -70,7 +65,7 @@ def test_strokes_keep_to_a_mask_from_a_file(cat: str, tmp_path: Path) -> None:
 def test_two_pictures_are_morphed(cat: str, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
     Image.open(cat).transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(other)
-    errors = example("morph").main(cat, str(other), str(tmp_path / "a.webp"), STEPS, 40)
+    errors = run("morph", cat, str(other), str(tmp_path / "a.webp"), STEPS, 40)
     assert max(errors) < 0.03
     with Image.open(tmp_path / "a.webp") as moving:
         assert getattr(moving, "n_frames", 1) == 24
@@ -85,7 +80,7 @@ def test_a_network_compares(cat: str, tmp_path: Path) -> None:
         state[f"features.{2 * i}.bias"] = torch.zeros(after)
     torch.save(state, tmp_path / "weights.pth")
     path = str(tmp_path / "weights.pth")
-    losses = example("perceptual_loss").main(cat, str(tmp_path / "a.svg"), path, STEPS, CURVES)
+    losses = run("perceptual_loss", cat, str(tmp_path / "a.svg"), path, STEPS, CURVES)
     assert losses[-1] < 0.8 * losses[0]
 
 

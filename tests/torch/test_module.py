@@ -110,7 +110,7 @@ def test_the_scene_holds_what_a_file_can() -> None:
         assert (getattr(tensors.scene(), name) == held).all()
     assert (tensors.scene().paint[:-1] != Paint.FLAT).all()
     tensors.values["points"][0, 0] = torch.nan
-    with pytest.raises(ValueError, match="points holds numbers that are not finite"):
+    with pytest.raises(ValueError, match="points: numbers that are not finite"):
         tensors.scene()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
 from warpsplat.errors import UsageError
 from warpsplat.extensions import renderer_names
@@ -154,6 +157,13 @@ def test_over() -> None:
     torch.testing.assert_close(over(clear, torch.zeros(36, 40, 3)), clear[..., :3])
 
 
+def test_without_torch_one_line_says_what_to_do() -> None:
+    code = "import sys; sys.modules['torch'] = None; import warpsplat.torch"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
+    assert done.stderr.splitlines()[-1] == message
+
+
 SPLINES, ONES = mixed_scene(seed=1), torch.ones(4, dtype=torch.float32)
 
 
@@ -176,8 +186,8 @@ REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
     ),
     "colors: numbers that are not finite": (ValueError, values(colors=torch.zeros(4, 3).float() / 0)),
     "focus has no gradient": (ValueError, values(focus=torch.zeros(4, 3).float().requires_grad_())),
-    "width must be a number of pixels": (UsageError, refused(width=0)),
-    "would stretch": (UsageError, refused(width=40, height=72)),
+    "width must be a whole number": (UsageError, refused(width=0)),
+    "do not have the proportions": (UsageError, refused(width=40, height=72)),
     "not 'fast'": (UsageError, refused(renderer="fast")),
     "is a spline": (ValueError, refused(renderer="splat")),
     "no scene": (UsageError, lambda: render([])),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -13,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.batch.options import OPTIONS, BatchOptions
+from warpsplat.batch.options import BatchOptions, batch_options
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import decorated
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.run.options import KINDS
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
 
 @click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("inputs", nargs=-1, required=True, metavar="INPUT...")
-@functools.partial(decorated, options=OPTIONS)
+@batch_options
 def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **given: Any) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
 

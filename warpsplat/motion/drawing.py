@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from warpsplat.motion.films import Frame, frame_count, frame_size, rasterised, size_of, zoom_of
+from warpsplat.motion.films import Frame, frame_count, rasterised, zoom_and_size
 from warpsplat.portable.linear import product
+from warpsplat.run.svg import size_of
+from warpsplat.svg import document
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import number
 from warpsplat.svg.paths import cubics
@@ -20,10 +22,7 @@ from warpsplat.svg.write import MARK
 SPACE = f"{{{NAMESPACE}}}"
 LINK = "http://www.w3.org/1999/xlink"
 
-DRAWN = {
-    SPACE + tag
-    for tag in ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "text", "image", "use")
-}
+DRAWN = {SPACE + tag for tag in (*document.DRAWN, "text", "image", "use")}
 """Elements that appear as a whole."""
 
 HIDDEN = {
@@ -43,8 +42,7 @@ PIECES = 8
 """Line segments that approximate a cubic's length."""
 
 
-@dataclass(frozen=True)
-class DrawnElement:
+class DrawnElement(NamedTuple):
     """An element, and when it is drawn."""
 
     element: ET.Element
@@ -120,19 +118,13 @@ def _parsed(text: str) -> ET.Element:
 def film(text: str, path: Path, width: int | None, seconds: float, *, own: bool) -> Iterator[Frame]:
     """Yield the frames of a film; the last one is the file as a viewer shows it.
 
-    Args:
-        text: the SVG.
-        path: of the film.
-        width: of the film [px]; None: by its format.
-        seconds: duration.
-        own: whether warpsplat wrote the SVG.
+    ``width``: see ``zoom_of``; ``own``: whether warpsplat wrote the SVG.
     """
-    zoom = zoom_of(path, size_of(text), width)
-    size = frame_size(text, zoom)
+    zoom, size = zoom_and_size(text, path, width)
     root = _parsed(text)
     elements = schedule(root, seconds)
     if own:
-        for name, side in zip(("width", "height"), size_of(text), strict=True):
+        for name, side in zip(("width", "height"), size_of(text, path.name), strict=True):
             root.set(name, f"{side * zoom:.9g}")
     count = frame_count(path, size, seconds)
     originals = [dict(drawn.element.attrib) for drawn in elements]

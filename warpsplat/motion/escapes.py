@@ -21,14 +21,9 @@ LARGEST_PICTURE = (1600, 800)
 
 
 def picture_escapes(terminal: Terminal, pixels: Pixels, columns: int, rows: int, number: int) -> str:
-    """Return the text that draws ``pixels``; the cursor must be in the first column.
+    """Return the text that draws ``pixels`` on ``columns`` x ``rows`` cells from the first column on.
 
-    Args:
-        terminal: to draw on.
-        pixels: ``columns`` x ``rows`` of the terminal's cells.
-        columns: width.
-        rows: height.
-        number: from 1; in kitty, a picture replaces the previous one of the same number.
+    ``number``: from 1; in kitty, a picture replaces the previous one of the same number.
     """
     if terminal.protocol == "blocks":
         lines = half_blocks(pixels, true_color=terminal.true_color)

@@ -9,32 +9,26 @@ import struct
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from PIL import Image
 
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import UsageError
 from warpsplat.files.image import WEBP_SIDE
 from warpsplat.files.marks import GIF_COMMENT, MP4_MARK, WEBP_MARK
 from warpsplat.motion.timing import HOLD
-from warpsplat.svg.inspect import inspect_svg, svg_size
+from warpsplat.run.svg import size_of
 from warpsplat.svg.viewer import render_own, render_svg
 
 VIDEO_PACKAGE = "av"
 """FFmpeg with an H.264 encoder; OpenCV only has MPEG-4 part 2, which no browser plays."""
 
 
-class FilmFormat(NamedTuple):
-    """Defaults of a file format."""
+RATES = {".gif": 12.5, ".webp": 15, ".mp4": 25}
+"""Frames per second, by extension; GIFs count in hundredths of a second."""
 
-    rate: float
-    """Frames per second."""
-    side: int
-    """Longest side if no width is given [px]."""
-
-
-FORMATS = {".gif": FilmFormat(12.5, 480), ".webp": FilmFormat(15, 800), ".mp4": FilmFormat(25, 800)}
-"""By extension. GIFs count in hundredths of a second, and are large."""
+SIDES = {".gif": 480, ".webp": 800, ".mp4": 800}
+"""Longest side if no width is given [px]; GIFs are large."""
 
 MIN_SIDE = 320
 """Longest side of a film of a smaller image [px]."""
@@ -56,7 +50,7 @@ def check_format(path: Path) -> None:
         UsageError: the extension is unknown, or a package is missing; the message says how to install it.
     """
     extension = path.suffix.lower()
-    if extension not in (".svg", *FORMATS):
+    if extension not in (".svg", *RATES):
         raise UsageError(f"{path}: not an animation format; the name must end in .svg, .gif, .webp or .mp4")
     if extension == ".mp4" and importlib.util.find_spec(VIDEO_PACKAGE) is None:
         raise UsageError(
@@ -65,23 +59,8 @@ def check_format(path: Path) -> None:
         )
 
 
-# Frames.
-
-
-def size_of(text: str) -> tuple[float, float]:
-    """Return the width and height of an SVG [px].
-
-    Raises:
-        ImageError: it has no size.
-    """
-    size = svg_size(inspect_svg(text).root)
-    if size is None:
-        raise ImageError("has neither a size nor a viewBox")
-    return size
-
-
 def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
-    """Return pixels of the film per pixel of a picture of ``size``.
+    """Return pixels of a film of ``width``, by default the format's, per pixel of a picture of ``size``.
 
     The shorter side keeps at least a pixel as long as the longer one has at most ``WEBP_SIDE``, which is also
     the limit of H.264 encoders.
@@ -89,38 +68,30 @@ def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
     if width is not None:
         zoom = width / size[0]
     else:
-        zoom = min(FORMATS[path.suffix.lower()].side, max(*size, MIN_SIDE)) / max(size)
+        zoom = min(SIDES[path.suffix.lower()], max(*size, MIN_SIDE)) / max(size)
     return min(max(zoom, 1 / min(size)), WEBP_SIDE / max(size))
 
 
-def frame_size(text: str, zoom: float) -> Size:
-    """Return the whole pixels that an SVG covers at ``zoom``."""
-    width, height = size_of(text)
-    return max(1, int(width * zoom + 1e-6)), max(1, int(height * zoom + 1e-6))
+def zoom_and_size(text: str, path: Path, width: int | None) -> tuple[float, Size]:
+    """Return the zoom of an SVG in a film, and the whole pixels that it covers."""
+    size = size_of(text, path.name)
+    zoom = zoom_of(path, size, width)
+    return zoom, (max(1, int(size[0] * zoom + 1e-6)), max(1, int(size[1] * zoom + 1e-6)))
 
 
 def frame_count(path: Path, size: Size, seconds: float) -> int:
     """Return the largest number of frames for a movement of ``seconds``."""
     most = MAX_PIXELS // (size[0] * size[1])
-    return max(2, min(most, round(FORMATS[path.suffix.lower()].rate * seconds)))
+    return max(2, min(most, round(RATES[path.suffix.lower()] * seconds)))
 
 
 def rasterised(text: str, size: Size, zoom: float | None = None) -> Image.Image:
     """Render an SVG as viewers do: RGBA, cropped to ``size``.
 
-    Args:
-        text: any SVG; without a ``zoom``, one that was written by warpsplat, of this size.
-        size: of the picture.
-        zoom: magnification.
-
-    Raises:
-        ImageError: it cannot be drawn.
+    Without a ``zoom``, it must be one of this size that warpsplat wrote.
     """
     image = render_own(text) if zoom is None else render_svg(text, zoom=zoom)
     return image.convert("RGBA").crop((0, 0, *size))
-
-
-# Encoders.
 
 
 def encoded(path: Path, frames: Iterable[Frame]) -> bytes:
@@ -185,7 +156,7 @@ def _mp4(frames: list[Frame]) -> bytes:
     """Encode an MP4 that all players accept: even sides, constant rate, chroma at half the resolution."""
     import av
 
-    rate = round(FORMATS[".mp4"].rate)
+    rate = round(RATES[".mp4"])
     width, height = (max(2, side // 2 * 2) for side in frames[0][0].size)
     # By way of a file, so that "faststart" can move the index to the front, for players that stream.
     with tempfile.TemporaryDirectory(prefix="warpsplat-") as folder:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_left
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,17 +25,13 @@ PAIRS_AT_ONCE = 1 << 18
 """Pairs of shapes compared together: bounds the memory."""
 
 
-class Tracks(NamedTuple):
-    """The shapes of several scenes, each with an identity."""
+def track_shapes(scenes: Sequence[Scene]) -> tuple[list[IndexArray], list[int]]:
+    """Track shapes through the scenes of a run, which are in order.
 
-    numbers: list[IndexArray]
-    """By scene, the identity of each shape."""
-    order: list[int]
-    """All identities from back to front, consistent with every scene."""
-
-
-def track_shapes(scenes: Sequence[Scene]) -> Tracks:
-    """Track shapes through the scenes of a run, which are in order."""
+    Returns:
+        by scene, the identity of each shape; and all identities from back to front, consistent with every
+        scene.
+    """
     numbers = [np.arange(len(scenes[0]))]
     order, count = list(range(len(scenes[0]))), len(scenes[0])
     for before, after in itertools.pairwise(map(features, scenes)):
@@ -52,7 +47,7 @@ def track_shapes(scenes: Sequence[Scene]) -> Tracks:
                 count += 1
         numbers.append(now)
         order = added.get(-1, []) + [n for old in order for n in (old, *added.get(old, ()))]
-    return Tracks(numbers, order)
+    return numbers, order
 
 
 def features(scene: Scene) -> FloatArray:

@@ -23,43 +23,37 @@ if TYPE_CHECKING:
 
 PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
 
-OPTIONS = {
-    "animate": click.option(
-        "--animate",
-        type=FILE,
-        metavar="FILE",
-        help="Also write an animation: .svg, .gif, .webp or .mp4.",
-    ),
-    "animate_what": click.option(
-        "--animate-what",
-        type=click.Choice(["training", "drawing"]),
-        help="How the shapes were optimised, or how they are drawn one after the other.  [default: training;"
-        " drawing for traced images]",
-    ),
-    "animate_width": click.option(
-        "--animate-width",
-        type=int,
-        metavar="PX",
-        help="Width of a .gif, .webp or .mp4.  [default: the image's; at most 800, of a GIF 480]",
-    ),
-    "preview": click.option(
-        "--preview",
-        type=click.Choice(PROTOCOLS),
-        help="Show the picture in the terminal (stderr), live during the run, by its best protocol;"
-        " --preview=NAME chooses one.",
-    ),
-}
-
 
 class MotionHook(RunHook):
     """Records a run for an animation, and shows it in the terminal."""
 
-    options = OPTIONS
+    options = {  # noqa: RUF012
+        "animate": click.option(
+            "--animate", type=FILE, metavar="FILE", help="Also write an animation: .svg, .gif, .webp or .mp4."
+        ),
+        "animate_what": click.option(
+            "--animate-what",
+            type=click.Choice(["training", "drawing"]),
+            help="How the shapes were optimised, or how they are drawn one after the other."
+            "  [default: training; drawing for traced images]",
+        ),
+        "animate_width": click.option(
+            "--animate-width",
+            type=int,
+            metavar="PX",
+            help="Width of a .gif, .webp or .mp4.  [default: the image's; at most 800, of a GIF 480]",
+        ),
+        "preview": click.option(
+            "--preview",
+            type=click.Choice(PROTOCOLS),
+            help="Show the picture in the terminal (stderr), live during the run, by its best protocol;"
+            " --preview=NAME chooses one.",
+        ),
+    }
 
     def __init__(
         self, animate: Path | None, animate_what: Any, animate_width: int | None, preview: str | None
     ) -> None:
-        """Take the values of the options."""
         self._file, self._what, self._width, self._protocol = animate, animate_what, animate_width, preview
         self._recorder: Recorder | None = None
         self._preview: Preview | None = None

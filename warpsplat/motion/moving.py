@@ -36,11 +36,8 @@ class PathForm(NamedTuple):
     closed: int
 
 
-class AttributeValue(NamedTuple):
-    """An attribute at a keyframe."""
-
-    numbers: FloatArray
-    text: str
+Value = tuple[FloatArray, str]
+"""An attribute at a keyframe: its numbers, and its text."""
 
 
 @dataclass
@@ -55,7 +52,7 @@ class MovingElement:
     """Which of its points are those of the shape at the last keyframe, shape (point,)."""
     points: list[FloatArray] = field(default_factory=list)
     """By keyframe, shape (point, 2)."""
-    values: dict[str, list[AttributeValue]] = field(default_factory=dict)
+    values: dict[str, list[Value]] = field(default_factory=dict)
     """By attribute and keyframe."""
     end: int = 0
     """Last keyframe."""
@@ -70,7 +67,7 @@ class MovingElement:
 def moving_elements(
     scenes: Sequence[Scene], keys: Sequence[int], tick: float, units: float, static: Callable[[Scene], str]
 ) -> tuple[str, str]:
-    """Return elements that move between the scenes ``keys``, and their style sheet.
+    """Return elements that move between keyframes, and their style sheet.
 
     Args:
         scenes: of the run, as their files show them, with little movement between two.
@@ -79,11 +76,11 @@ def moving_elements(
         units: width of the canvas in the elements' coordinates.
         static: returns the markup of a scene of shapes that cannot move, such as gradients.
     """
-    tracks = track_shapes(scenes)
+    numbers, order = track_shapes(scenes)
     elements: dict[int, list[MovingElement]] = {}
     for key, index in enumerate(keys):
-        _add_keyframe(elements, key, scenes[index], tracks.numbers[index], units, static)
-    ordered = [element for shape in tracks.order for element in elements.get(shape, ())]
+        _add_keyframe(elements, key, scenes[index], numbers[index], units, static)
+    ordered = [element for shape in order for element in elements.get(shape, ())]
     written = [_written(element, f"p{i}", tick, len(keys) - 1) for i, element in enumerate(ordered)]
     return "".join(text for text, _ in written), STYLE + "".join(rule for _, rule in written)
 
@@ -124,16 +121,16 @@ def _append(elements: list[MovingElement], element: MovingElement) -> None:
     elements.append(element)
 
 
-def _attributes(scene: Scene, row: int, color: str, zoom: float) -> dict[str, AttributeValue]:
+def _attributes(scene: Scene, row: int, color: str, zoom: float) -> dict[str, Value]:
     """Return a shape's colour, opacity and width as attributes."""
     kind = Kind(int(scene.kind[row]))
     opacity, width = scene.opacities[row : row + 1], zoom * scene.widths[row : row + 1]
     found = {
-        PAINTED[kind]: AttributeValue(scene.colors[row], color),
-        f"{PAINTED[kind]}-opacity": AttributeValue(opacity, number(float(opacity[0]), OPACITY_DECIMALS)),
+        PAINTED[kind]: (scene.colors[row], color),
+        f"{PAINTED[kind]}-opacity": (opacity, number(float(opacity[0]), OPACITY_DECIMALS)),
     }
     if kind == Kind.STROKE:
-        found["stroke-width"] = AttributeValue(width, number(float(width[0]), 1))
+        found["stroke-width"] = (width, number(float(width[0]), 1))
     return found
 
 
@@ -175,12 +172,7 @@ def _continues(element: MovingElement, form: PathForm, points: FloatArray) -> bo
 def kept_points(before: FloatArray, after: FloatArray) -> IndexArray:
     """Return which points of an outline remain in one with fewer: the nearest in total, in order.
 
-    Args:
-        before: shape (point, 2).
-        after: shape (kept, 2).
-
-    Returns:
-        shape (kept,).
+    ``before``: shape (point, 2); ``after``: shape (kept, 2); the result: shape (kept,).
     """
     squares = ((after[:, None] - before) ** 2).sum(axis=2)
     # sums[i, j]: the least sum for the first points of both, where point i of ``after`` is j of ``before``.
@@ -211,16 +203,10 @@ STYLE = (
 
 
 def _written(element: MovingElement, name: str, tick: float, last: int) -> tuple[str, str]:
-    """Return an element and the rule of its changes.
+    """Return an element and the rule of its changes, of this ``name``; ``last``: the last keyframe.
 
     Paths move by SMIL, which all browsers support; colours and opacities change by style sheets, which take a
     third of the time.
-
-    Args:
-        element: to write.
-        name: of the rule.
-        tick: time between two keyframes [s].
-        last: number of the last keyframe.
     """
     group = "g" if element.form is None else ""
     animations, rule = [], ""
@@ -239,7 +225,7 @@ def _written(element: MovingElement, name: str, tick: float, last: int) -> tuple
     style = f' style="animation:{",".join(animations)}"' if animations else ""
     if element.form is None:
         return f"<g{style}>{element.markup}</g>\n", ""
-    attributes = "".join(f' {name}="{values[-1].text}"' for name, values in element.values.items())
+    attributes = "".join(f' {name}="{values[-1][1]}"' for name, values in element.values.items())
     if element.form.kind == Kind.STROKE:
         attributes += f" {STROKE_ATTRIBUTES}"
     elif element.form.rule:
@@ -262,25 +248,25 @@ def _path(data: list[str], attributes: str, key: int, tick: float) -> str:
     return f'{head}><animate attributeName="d" {times} values="{";".join(data)}"/></path>\n'
 
 
-def _changes(values: dict[str, list[AttributeValue]]) -> list[int]:
+def _changes(values: dict[str, list[Value]]) -> list[int]:
     """Return keyframes at which an attribute has changed by more than its tolerance, and those before."""
     found: set[int] = set()
     for name, course in values.items():
-        now = course[0].numbers
-        for i, value in enumerate(course[1:], 1):
-            if np.abs(value.numbers - now).max() > TOLERANCE[name]:
-                now = value.numbers
+        now = course[0][0]
+        for i, (numbers, _) in enumerate(course[1:], 1):
+            if np.abs(numbers - now).max() > TOLERANCE[name]:
+                now = numbers
                 found |= {i - 1, i}
     return sorted(found)
 
 
-def _steps(values: dict[str, list[AttributeValue]], changes: list[int]) -> str:
+def _steps(values: dict[str, list[Value]], changes: list[int]) -> str:
     """Return the steps of a rule, with the attributes' final values at the last one."""
     first, length = changes[0], changes[-1] - changes[0]
     texts = []
     for i in changes:
         key = -1 if i == changes[-1] else i
-        declarations = ";".join(f"{name}:{course[key].text}" for name, course in values.items())
+        declarations = ";".join(f"{name}:{course[key][1]}" for name, course in values.items())
         texts.append(f"{number(100 * (i - first) / length, 1)}%{{{declarations}}}")
     return "".join(texts)
 

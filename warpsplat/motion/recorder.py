@@ -119,15 +119,14 @@ class Recorder:
             raise UsageError(f"an animation shows {' or '.join(get_args(Subject))}, not {what}")
         if what == "training" and not self.has_training:
             raise UsageError(f"{path}: there is no training to show; the order of drawing can be shown")
-        vector = path.suffix.lower() == ".svg"
+        vector, recorded = path.suffix.lower() == ".svg", (self.scenes, self.moments, result)
         if what == "training" and vector:
-            data = training.animated_svg(self.scenes, self.moments, result, seconds).encode()
+            data = training.animated_svg(*recorded, seconds).encode()
         elif what == "training":
             start_warp()
             backend = Backend.on(choose_device(device), threads)
             with device_lock(backend.device):
-                frames = training.film(self.scenes, self.moments, result, path, width, seconds, backend)
-                data = films.encoded(path, frames)
+                data = films.encoded(path, training.film(*recorded, path, width, seconds, backend))
         elif vector:
             data = drawing.animated_svg(result.svg, seconds).encode()
         else:

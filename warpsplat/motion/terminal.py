@@ -9,7 +9,7 @@ import select
 import shutil
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import IO, Literal
 
@@ -23,18 +23,13 @@ BLOCK_CELL, DEFAULT_CELL = (1, 2), (10, 20)
 """Cell of half blocks; and that of a terminal that does not report its own."""
 
 BY_TERM_PROGRAM: dict[str, Protocol] = {
-    "iterm.app": "iterm",
-    "wezterm": "iterm",
-    "mintty": "iterm",
-    "ghostty": "kitty",
-    "kitty": "kitty",
+    **dict.fromkeys(("iterm.app", "wezterm", "mintty"), "iterm"),
+    **dict.fromkeys(("ghostty", "kitty"), "kitty"),
 }
 
 BY_TERM: dict[str, Protocol] = {
-    "xterm-kitty": "kitty",
-    "xterm-ghostty": "kitty",
-    "foot": "sixel",
-    "mlterm": "sixel",
+    **dict.fromkeys(("xterm-kitty", "xterm-ghostty"), "kitty"),
+    **dict.fromkeys(("foot", "mlterm"), "sixel"),
 }
 """TERM is the only one of these variables that ssh passes on."""
 
@@ -62,25 +57,20 @@ class Terminal:
 
 
 def detect(
-    stream: IO[str],
-    protocol: Protocol | None = None,
-    environ: Mapping[str, str] = os.environ,
-    ask: Callable[[], str] | None = None,
+    stream: IO[str], protocol: Protocol | None = None, ask: Callable[[], str] | None = None
 ) -> Terminal | None:
     """Return how pictures can be drawn on ``stream``, or None if it cannot show any.
 
-    Args:
-        stream: to draw on.
-        protocol: the one to use, whatever the terminal is; None: the best one available.
-        environ: environment variables.
-        ask: returns the terminal's answer to ``QUERY``; default: ``answer_of_terminal``.
+    ``protocol``: default: the best one available; ``ask``: returns the terminal's answer to ``QUERY``,
+    default: ``answer_of_terminal``.
     """
-    live, term = stream.isatty(), environ.get("TERM", "")
+    environ, live = os.environ, stream.isatty()
+    term = environ.get("TERM", "")
     if protocol is None and (not live or term == "dumb"):
         return None
     multiplexed = "TMUX" in environ or term.startswith(("screen", "tmux"))
     if protocol is None:
-        protocol = "blocks" if multiplexed or os.name == "nt" else _by_environment(environ)
+        protocol = "blocks" if multiplexed or os.name == "nt" else _by_environment()
     columns, lines, cell = _screen_size(stream)
     unknown = protocol is None or (protocol == "sixel" and cell is None)
     if unknown and live and not multiplexed and os.name == "posix":
@@ -93,25 +83,25 @@ def detect(
         columns,
         lines,
         BLOCK_CELL if protocol == "blocks" else cell or DEFAULT_CELL,
-        not live or _has_true_color(environ),
+        not live or _has_true_color(),
         live,
         "TMUX" in environ,
     )
 
 
-def _by_environment(environ: Mapping[str, str]) -> Protocol | None:
-    if "KITTY_WINDOW_ID" in environ:
+def _by_environment() -> Protocol | None:
+    if "KITTY_WINDOW_ID" in os.environ:
         return "kitty"
-    if environ.get("LC_TERMINAL") == "iTerm2":  # ssh may pass it on
+    if os.environ.get("LC_TERMINAL") == "iTerm2":  # ssh may pass it on
         return "iterm"
-    program = environ.get("TERM_PROGRAM", "").lower()
-    return BY_TERM_PROGRAM.get(program) or BY_TERM.get(environ.get("TERM", ""))
+    program = os.environ.get("TERM_PROGRAM", "").lower()
+    return BY_TERM_PROGRAM.get(program) or BY_TERM.get(os.environ.get("TERM", ""))
 
 
-def _has_true_color(environ: Mapping[str, str]) -> bool:
-    term = environ.get("TERM", "")
-    announced = environ.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
-    return announced or "direct" in term or "WT_SESSION" in environ or term in BY_TERM
+def _has_true_color() -> bool:
+    term = os.environ.get("TERM", "")
+    announced = os.environ.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
+    return announced or "direct" in term or "WT_SESSION" in os.environ or term in BY_TERM
 
 
 def _screen_size(stream: IO[str]) -> tuple[int, int, Cell | None]:

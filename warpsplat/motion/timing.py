@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from warpsplat.portable.elementary import power
 
@@ -20,36 +19,22 @@ EARLY = 1.5
 """Share of the run = share of the animation to this power: much changes early, little late."""
 
 
-@dataclass(frozen=True)
-class Showing:
-    """A picture of an animation."""
+def showings(moments: Sequence[int], ticks: int, seconds: float) -> dict[int, float]:
+    """Return which recorded pictures an animation shows, by index, and how long each [s].
 
-    index: int
-    """Among the recorded pictures."""
-    seconds: float
-    """How long it is shown."""
+    Late ones are skipped if there are more than ``ticks``, equal parts of the animation.
 
-
-def showings(moments: Sequence[int], ticks: int, seconds: float) -> list[Showing]:
-    """Return which recorded pictures an animation shows; late ones are skipped if there are more than ticks.
-
-    Args:
-        moments: when the pictures were recorded, as numbers of progress reports, ascending.
-        ticks: equal parts of the animation.
-        seconds: duration.
+    ``moments``: when the pictures were recorded, as numbers of progress reports, ascending; ``seconds``:
+    duration.
     """
-    found: list[Showing] = []
+    found: dict[int, float] = {}
     for tick in range(ticks if moments else 0):
         now = (moments[-1] + 1) * float(power((tick + 0.5) / ticks, EARLY))
         index = max(0, bisect_right(moments, now) - 1)
-        if found and found[-1].index == index:
-            found[-1] = Showing(index, found[-1].seconds + seconds / ticks)
-        else:
-            found.append(Showing(index, seconds / ticks))
+        found[index] = found.get(index, 0.0) + seconds / ticks
     return found
 
 
 def kept(moments: Sequence[int], most: int) -> list[int]:
     """Return the indices of at most ``most`` pictures: those that would be shown, the first and the last."""
-    chosen = {showing.index for showing in showings(moments, most - 2, 1.0)}
-    return sorted(chosen | {0, len(moments) - 1})
+    return sorted({*showings(moments, most - 2, 1.0), 0, len(moments) - 1})

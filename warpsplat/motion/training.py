@@ -8,17 +8,23 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from PIL import Image
+
+from warpsplat.errors import CapacityError
 from warpsplat.fit.export import export, shown_paths
 from warpsplat.fit.settings import Settings
-from warpsplat.motion.films import Frame, frame_count, frame_size, rasterised, size_of, zoom_of
+from warpsplat.motion.films import Frame, Size, frame_count, rasterised, zoom_and_size
 from warpsplat.motion.moving import moving_elements
-from warpsplat.motion.painter import Painter
 from warpsplat.motion.timing import kept, showings
-from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.run.render import to_pillow
 from warpsplat.run.result import Result
+from warpsplat.run.svg import size_of
 from warpsplat.scene import Canvas, Scene
 from warpsplat.svg.numbers import hex_colors, number
-from warpsplat.svg.write import GRIDS, MARK, write_svg
+from warpsplat.svg.write import GRIDS, MARK, resized, write_svg
 
 
 def film(
@@ -32,32 +38,55 @@ def film(
 ) -> Iterator[Frame]:
     """Yield the frames of a film; the last one is the file as a viewer shows it.
 
-    Args:
-        scenes: of the run.
-        moments: when they were recorded, see ``showings``.
-        result: of the run.
-        path: of the film.
-        width: of the film [px]; None: by its format.
-        seconds: duration.
-        backend: renders the scenes.
+    ``moments``: when the scenes were recorded, see ``showings``; ``width``: see ``zoom_of``.
     """
     end = _final_svg(result)
-    zoom = zoom_of(path, size_of(end), width)
-    size = frame_size(end, zoom)
+    zoom, size = zoom_and_size(end, path, width)
     painter = Painter(backend, Settings(renderer=result.renderer), size)
-    for showing in showings(moments, frame_count(path, size, seconds), seconds):
-        scene = scenes[showing.index]
+    for index, shown in showings(moments, frame_count(path, size, seconds), seconds).items():
+        scene = scenes[index]
         scale = zoom * result.scene.canvas.width / scene.canvas.width  # runs may be on reduced images
-        yield painter.paint(scene, scale), showing.seconds
+        yield painter.paint(scene, scale), shown
     yield rasterised(end, size, zoom), 0.0
 
 
 def _final_svg(result: Result) -> str:
     """Return the file or, if it is a sheet of paper, the picture on it."""
     canvas = result.scene.canvas
-    if size_of(result.svg) == (canvas.width, canvas.height):
+    if size_of(result.svg, "the SVG") == (canvas.width, canvas.height):
         return result.svg
     return export(result.scene, Settings(renderer=result.renderer), GRIDS[-1])
+
+
+class Painter:
+    """Draws scenes as their files look, by warpsplat's renderer, which is seven times as fast as a viewer.
+
+    Each scene's capacity is the guess for the next.
+    """
+
+    def __init__(self, backend: Backend, settings: Settings, size: Size) -> None:
+        """``settings``: of the run; ``size``: of the frames [px]."""
+        self._backend, self._settings, self._size = backend, settings, size
+        self._capacity: Capacity | None = None
+
+    def paint(self, scene: Scene, scale: float) -> Image.Image:
+        """Return a scene with ``scale`` px per canvas unit, cropped to the size; RGBA if not opaque."""
+        if len(scene) and not scene.pictures:
+            try:
+                return self._rendered(scene, scale)
+            except CapacityError:
+                pass
+        text = export(scene, self._settings, GRIDS[-1])
+        if scene.pictures:  # content of other files
+            return rasterised(text, self._size, scale)
+        return rasterised(resized(text, *self._size, scale), self._size)
+
+    def _rendered(self, scene: Scene, scale: float) -> Image.Image:
+        parameters = Parameters(shown_paths(scene, self._settings), self._backend)
+        renderer = Renderer(parameters, Viewport(*self._size, scale), capacity=self._capacity)
+        renderer.forward_complete()
+        self._capacity = renderer.capacity
+        return to_pillow(renderer.read_image())
 
 
 # An SVG.

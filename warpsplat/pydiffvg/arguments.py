@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -104,8 +106,7 @@ def serialize(
 ) -> SceneArguments:
     """Return the structure and the tensors of a scene, these on ``device``.
 
-    Raises:
-        UsageError: a shape or group that cannot be rendered.
+    A ``UsageError`` names a shape or group that cannot be rendered.
     """
     tensors = _Tensors(device)
     forms = [_shape(shape, f"shape {number}", tensors) for number, shape in enumerate(shapes)]
@@ -130,16 +131,11 @@ class _Tensors:
         self._next = FIRST
 
     def check(self, value: Tensor, shape: tuple[int, ...], name: str) -> Tensor:
-        """Return ``value`` as float32 on the device; -1 in ``shape`` stands for any length.
-
-        Raises:
-            UsageError: it is not a tensor, or has another shape.
-        """
+        """Return a tensor as float32 on the device, if of this ``shape``; -1 stands for any length."""
         if not isinstance(value, Tensor):
             raise UsageError(f"{name} is a {type(value).__name__}, not a tensor")
-        if value.dim() != len(shape) or any(
-            w not in {-1, n} for n, w in zip(value.shape, shape, strict=True)
-        ):
+        fits = map(lambda n, wanted: wanted in (-1, n), value.shape, shape)
+        if len(value.shape) != len(shape) or not all(fits):
             wanted = ", ".join("n" if n < 0 else str(n) for n in shape)
             raise UsageError(f"{name} has shape {tuple(value.shape)}, not ({wanted})")
         return value.to(self._device, torch.float32)
@@ -182,11 +178,7 @@ def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
 
 
 def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
-    """Return the number of control points of each segment.
-
-    Raises:
-        UsageError: they do not fit the number of points.
-    """
+    """Return the number of control points of each segment, if they fit the number of points."""
     is_open = not shape.is_closed
     if isinstance(shape, Polygon):
         counts = (0,) * (points - is_open)
@@ -230,3 +222,53 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     tensors.add(color.offsets, (-1,), f"offsets of {name}")
     tensors.add(color.stop_colors, (len(color.offsets), 4), f"stop_colors of {name}")
     return PaintStructure(kind, len(color.offsets), first)
+
+
+# The last scene, used again while shapes and groups are the same with the same tensors.
+
+
+def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[object]:
+    """Return shapes, groups and gradients and their fields, which are compared by identity."""
+    owners: list[object] = [*shapes, *groups]
+    fields = list(chain.from_iterable(vars(each).values() for each in owners))
+    gradients = [each for each in fields if isinstance(each, (LinearGradient, RadialGradient))]
+    return owners + fields + list(chain.from_iterable(vars(each).values() for each in gradients))
+
+
+def _numbers(objects: list[object]) -> list[object]:
+    """Return sizes of tensors, and numbers that belong to the structure.
+
+    They are compared by value, as code can write into tensors without leaving a trace.
+    """
+    found: list[object] = [each.shape for each in objects if isinstance(each, torch.Tensor)]
+    for each in objects:
+        if isinstance(each, Path):
+            found.append(each.num_control_points.tolist())
+        elif isinstance(each, ShapeGroup):
+            matrix = each.shape_to_canvas
+            found += each.shape_ids.tolist(), matrix.tolist(), matrix.requires_grad
+    return found
+
+
+_last: tuple[list[object], list[object], SceneArguments] | None = None
+"""Objects, numbers and the scene that was made of them."""
+
+
+def serialize_cached(
+    width: int, height: int, shapes: Sequence[Shape], groups: Sequence[ShapeGroup], device: torch.device
+) -> SceneArguments:
+    """Return ``serialize`` of the arguments, or the last result where only values in tensors have changed."""
+    global _last  # noqa: PLW0603 - one scene is kept, with its tensors, until the next
+    objects = _objects(shapes, groups)
+    numbers = [int(width), int(height), device, len(shapes), *_numbers(objects)]
+    if last := _last:  # another thread may replace it meanwhile
+        before, before_numbers, scene = last
+        same = len(objects) == len(before) and all(map(operator.is_, objects, before))
+        if same and numbers == before_numbers:
+            return scene
+    scene = serialize(width, height, shapes, groups, device)
+    own = set(map(id, objects))
+    # Copies and results of operations are made again for each scene.
+    is_reusable = all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors)
+    _last = (objects, numbers, scene) if is_reusable else None
+    return scene

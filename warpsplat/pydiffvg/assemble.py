@@ -21,42 +21,29 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     canvas = layout.scene.canvas
     scale = canvas.width / scene.width, canvas.height / scene.height
     numbers: Tensor = Concatenate.apply(*scene.tensors)
-    matrices = None
-    if layout.transforms is not None:
-        matrices = numbers.index_select(0, layout.transforms.entries).view(-1, 3, 3)
-    paints = numbers.index_select(0, layout.paints).view(-1, 4)
-    values = layout.defaults | {
-        "points": _points(numbers, layout, matrices, scale),
-        "colors": paints[:, :3],
-        "opacities": paints[:, 3],
-    }
-    if layout.widths is not None:
-        half_widths = numbers.index_select(0, layout.widths)
-        values["widths"] = _widths(half_widths, layout, matrices, math.sqrt(scale[0] * scale[1]))
-    if layout.gradients is not None:
-        values |= _gradients(numbers, layout.gradients, torch.tensor(scale, device=numbers.device))
-    return values
-
-
-def _points(numbers: Tensor, layout: Layout, matrices: Tensor | None, scale: tuple[float, float]) -> Tensor:
-    """Return control points [px], shape (point, 2). ``matrices``: of the groups, shape (group, 3, 3)."""
     points = layout.points(numbers)
     if layout.order is not None:
         points = torch.cat([points, *(area.points(numbers) for area in layout.areas)])
         points = points.index_select(0, layout.order)
-    if matrices is not None and layout.transforms is not None:
+    widths = None
+    if layout.widths is not None:
+        widths = 2 * math.sqrt(scale[0] * scale[1]) * numbers.index_select(0, layout.widths)
+    if layout.transforms is not None:
+        matrices = numbers.index_select(0, layout.transforms.entries).view(-1, 3, 3)
         own = matrices.index_select(0, layout.transforms.point_group)
         points = torch.einsum("pij,pj->pi", own[:, :2, :2], points) + own[:, :2, 2]
-    return points if scale == (1.0, 1.0) else points * torch.tensor(scale, device=points.device)
-
-
-def _widths(half_widths: Tensor, layout: Layout, matrices: Tensor | None, scale: float) -> Tensor:
-    """Return stroke widths [px], shape (row,)."""
-    widths = 2 * scale * half_widths
-    if matrices is not None and layout.transforms is not None:
-        areas = matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0]
-        widths = widths * areas.abs().sqrt().index_select(0, layout.transforms.row_group)
-    return widths.clamp_min(0)
+        if widths is not None:
+            areas = matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0]
+            widths = widths * areas.abs().sqrt().index_select(0, layout.transforms.row_group)
+    if scale != (1.0, 1.0):
+        points = points * torch.tensor(scale, device=points.device)
+    paints = numbers.index_select(0, layout.paints).view(-1, 4)
+    values = layout.defaults | {"points": points, "colors": paints[:, :3], "opacities": paints[:, 3]}
+    if widths is not None:
+        values["widths"] = widths.clamp_min(0)
+    if layout.gradients is not None:
+        values |= _gradients(numbers, layout.gradients, torch.tensor(scale, device=numbers.device))
+    return values
 
 
 def _gradients(numbers: Tensor, gradients: Gradients, scale: Tensor) -> dict[str, Tensor]:

@@ -12,10 +12,9 @@ from warpsplat.pydiffvg.color import Color
 from warpsplat.pydiffvg.optimizable import (
     COLORS,
     BoundedOptimizer,
-    Bounds,
     OptimizableGradient,
     OptimizableTransform,
-    make_optimizer,
+    optimized,
 )
 from warpsplat.pydiffvg.save_svg import path_data, rgb_text
 from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
@@ -54,26 +53,17 @@ class OptimizableElement:
         if text not in {"", "none"}:
             matrix = torch.tensor(parse_transform(text)).float()
             self.transform = OptimizableTransform(matrix, self._settings["transforms"]).to(context.device)
-            if self.transform.is_optimized:
-                groups = self.transform.parameter_groups()
-                self.optimizers.append(make_optimizer(self._settings, groups, None))
+            self.optimizers += self.transform.optimizers(self._settings)
         self.opacity = self._opacity("opacity")
         self.paths: list[Path] = []
         if name_of(element) in DRAWN:
             self._read_shape()
 
-    def _optimize(self, tensors: list[Tensor], rate: float, wanted: bool, bounds: Bounds | None) -> None:
-        for tensor in tensors:
-            tensor.requires_grad_(wanted)
-        if wanted:
-            groups = [{"params": tensors, "lr": rate}]
-            self.optimizers.append(make_optimizer(self._settings, groups, bounds))
-
     def _opacity(self, name: str) -> Tensor:
         """Return an opacity, shape (1,), optimised where the element sets it."""
         value = torch.tensor([fraction(self._style[name])], device=self._context.device)
-        wanted = name in self._element.attrib and self._settings["optimize_alpha"]
-        self._optimize([value], self._settings["alpha_lr"], wanted, COLORS)
+        if name in self._element.attrib and self._settings["optimize_alpha"]:
+            self.optimizers.append(optimized(self._settings, [value], self._settings["alpha_lr"], COLORS))
         return value
 
     def _read_shape(self) -> None:
@@ -86,8 +76,9 @@ class OptimizableElement:
         for path in self.paths:
             path.points, path.stroke_width = path.points.to(device), half
         chosen = self._settings["paths"]
-        points = [path.points for path in self.paths]
-        self._optimize(points, chosen["shape_lr"], chosen["optimize_points"], None)
+        if chosen["optimize_points"]:
+            points = [path.points for path in self.paths]
+            self.optimizers.append(optimized(self._settings, points, chosen["shape_lr"]))
         self._opacities = [self._opacity(f"{name}-opacity") for name in ("fill", "stroke")]
         self._paints = [self._paint(name, subpaths) for name in ("fill", "stroke")]
 
@@ -97,7 +88,8 @@ class OptimizableElement:
         paint = resolve_paint(text, self._style, document, viewport, subpaths, torch.eye(3).numpy())
         if isinstance(paint, FlatColor):
             color = torch.tensor(paint.color, device=device)
-            self._optimize([color], self._settings["color_lr"], self._settings["optimize_color"], COLORS)
+            if self._settings["optimize_color"]:
+                self.optimizers.append(optimized(self._settings, [color], self._settings["color_lr"], COLORS))
             return color
         if isinstance(paint, Gradient):
             link = parse_link(text.strip())

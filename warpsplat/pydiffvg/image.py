@@ -19,14 +19,11 @@ def imwrite(
     gamma: float = 2.2,
     normalize: bool = False,
 ) -> None:
-    """Write an image with 8 bits per channel; missing folders are made.
+    """Write an image with 8 bits per channel, in the format of the extension; missing folders are made.
 
-    Args:
-        img: in [0, 1], shape (height, width) or (height, width, channel) with 1 to 4 channels, the fourth of
-            which is opacity.
-        filename: its extension is the format.
-        gamma: the first three channels are raised to the power 1 / gamma; 1 for colours that are sRGB.
-        normalize: whether to map the least value to 0 and the largest to 1 first.
+    ``img``: in [0, 1], shape (height, width) or (height, width, channel) with 1 to 4 channels, the fourth of
+    which is opacity. The others are raised to the power 1 / ``gamma``; 1 for colours that are sRGB.
+    ``normalize``: whether to map the least value to 0 and the largest to 1 first.
     """
     values = img.detach().cpu().numpy() if isinstance(img, torch.Tensor) else np.asarray(img)
     values = values.astype(np.float32)

@@ -85,14 +85,11 @@ class Area(NamedTuple):
 
 
 class Transforms(NamedTuple):
-    """The transforms of the groups."""
+    """Indices of the entries of the groups' transforms, shape (9 x group,); group of each point and row."""
 
     entries: Tensor
-    """Indices of their entries, shape (9 x group,)."""
     point_group: Tensor
-    """Group of each point, shape (point,)."""
     row_group: Tensor
-    """Group of each row, shape (row,)."""
 
 
 class Gradients(NamedTuple):
@@ -103,7 +100,6 @@ class Gradients(NamedTuple):
     is_radial: Tensor
     """Shape (row, 1)."""
     offsets: Tensor
-    """Shape (stop,)."""
     colors: Tensor
     """Shape (4 x stop,)."""
 
@@ -152,12 +148,8 @@ def make_layout(
 ) -> Layout:
     """Return the layout of the scenes of a structure.
 
-    Args:
-        structure: of the scenes.
-        size: width and height of the image [px], which are the units of our scene.
-        uniform: whether canvas units are scaled alike along x and y.
-        device: of the layout's tensors.
-        threads: of the CPU that render.
+    ``size``: width and height of the image [px], which are the units of our scene; ``uniform``: whether
+    canvas units are scaled alike along x and y.
     """
     rows = _rows(structure, uniform)
     outlines = [row.outlines() for row in rows]

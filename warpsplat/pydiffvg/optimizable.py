@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
@@ -47,18 +48,19 @@ class BoundedOptimizer:
                     value[0], value[-1] = 0.0, 1.0
 
 
-def make_optimizer(
-    settings: dict[str, Any], groups: list[dict[str, Any]], bounds: Bounds | None, is_sorted: bool = False
+def optimized(
+    settings: dict[str, Any],
+    tensors: Sequence[Tensor],
+    rate: float,
+    bounds: Bounds | None = None,
+    is_sorted: bool = False,
 ) -> BoundedOptimizer:
-    """Return the optimiser that ``settings`` name for parameter groups.
-
-    Raises:
-        UsageError: an unknown optimiser.
-    """
+    """Return the optimiser that ``settings`` name for tensors, which will have gradients."""
     name = settings["optimizer"]
     if name not in OPTIMIZERS:
         raise UsageError(f"optimizer {shown(name)} is none of {', '.join(OPTIMIZERS)}")
-    return BoundedOptimizer(OPTIMIZERS[name](groups), bounds, is_sorted)
+    optimizer = OPTIMIZERS[name]([tensor.requires_grad_() for tensor in tensors], lr=rate)
+    return BoundedOptimizer(optimizer, bounds, is_sorted)
 
 
 MODES = ("move", "rigid", "similarity", "affine")
@@ -78,17 +80,11 @@ class OptimizableTransform(torch.nn.Module):
     """Signs of the scales, shape (2,)."""
 
     def __init__(self, matrix: Tensor, settings: dict[str, Any]) -> None:
-        """Start at ``matrix``, shape (3, 3).
-
-        Raises:
-            UsageError: an unknown mode.
-        """
+        """Start at ``matrix``, shape (3, 3)."""
         super().__init__()
         mode = settings["transform_mode"]
         if mode not in MODES:
             raise UsageError(f"transform_mode {shown(mode)} is none of {', '.join(MODES)}")
-        self.is_optimized = bool(settings["optimize_transforms"])
-        self._rates = settings["transform_lr"], settings["transform_lr"] * settings["translation_mult"]
         rotation, scale, shear, translation = decompose(matrix.double())
         mirrored = scale[0] * scale[1] < 0
         uniform = abs(abs(scale[0]) - abs(scale[1])) < TOLERANCE and abs(shear) < TOLERANCE
@@ -103,21 +99,22 @@ class OptimizableTransform(torch.nn.Module):
             rotation, scale, shear, translation, mirrored = 0.0, (1.0, 1.0), 0.0, (0.0, 0.0), False
         self.register_buffer("mirror", torch.tensor([1.0, -1.0 if mirrored and mode != "affine" else 1.0]))
 
-        def parameter(value: Any, optimized: bool = True) -> torch.nn.Parameter:
-            values = torch.tensor(value, dtype=torch.float32)
-            return torch.nn.Parameter(values, requires_grad=optimized and self.is_optimized)
+        def parameter(value: Any) -> torch.nn.Parameter:
+            return torch.nn.Parameter(torch.tensor(value, dtype=torch.float32), requires_grad=False)
 
-        self.rotation = parameter(rotation)
-        self.scale = parameter(scale if mode == "affine" else scale[:1], mode != "move")
-        self.shear = parameter(shear, mode == "affine")
-        self.translation = parameter(translation)
+        self.rotation, self.shear, self.translation = map(parameter, (rotation, shear, translation))
+        self.scale = parameter(scale if mode == "affine" else scale[:1])
 
-    def parameter_groups(self) -> list[dict[str, Any]]:
-        """Return the parameter groups of an optimiser."""
-        others = [p for p in (self.rotation, self.scale, self.shear) if p.requires_grad]
+    def optimizers(self, settings: dict[str, Any]) -> list[BoundedOptimizer]:
+        """Return the optimisers of what the mode changes; ``settings``: see ``SvgOptimizationSettings``."""
+        own = settings["transforms"]
+        if not own["optimize_transforms"]:
+            return []
+        count = {"move": 1, "affine": 3}.get(own["transform_mode"], 2)
+        tensors, rate = [self.rotation, self.scale, self.shear][:count], own["transform_lr"]
         return [
-            {"params": others, "lr": self._rates[0]},
-            {"params": [self.translation], "lr": self._rates[1]},
+            optimized(settings, tensors, rate),
+            optimized(settings, [self.translation], rate * own["translation_mult"]),
         ]
 
     def forward(self) -> Tensor:
@@ -165,8 +162,7 @@ class OptimizableGradient:
             ("location", "location_lr", location, None),
         ):
             if chosen[f"optimize_{what}"]:
-                groups = [{"params": [tensor.requires_grad_() for tensor in tensors], "lr": chosen[rate]}]
-                self.optimizers.append(make_optimizer(settings, groups, bounds, what == "stops"))
+                self.optimizers.append(optimized(settings, tensors, chosen[rate], bounds, what == "stops"))
 
     def color(self, opacity: Tensor, matrix: Tensor) -> LinearGradient | RadialGradient:
         """Return the gradient on the canvas, with its stops' opacities multiplied by ``opacity``.

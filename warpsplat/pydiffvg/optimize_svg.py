@@ -15,7 +15,7 @@ import torch
 from warpsplat.errors import ImageError
 from warpsplat.pydiffvg.device import nearest
 from warpsplat.pydiffvg.element import Context, OptimizableElement
-from warpsplat.pydiffvg.optimizable import COLORS, make_optimizer
+from warpsplat.pydiffvg.optimizable import COLORS, optimized
 from warpsplat.pydiffvg.parse_svg import root_and_size
 from warpsplat.pydiffvg.render_pytorch import RenderFunction
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
@@ -112,14 +112,10 @@ class OptimizableSvg:
         verbose: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Read a document.
+        """Read an SVG, and print what was read if ``verbose``.
 
-        Args:
-            filename: of the SVG.
-            settings: what to optimise.
-            optimize_background: whether to optimise ``background`` too, which the caller composites on.
-            verbose: whether to print what was read.
-            device: of its tensors; if it is missing, the nearest one.
+        ``settings``: what to optimise; ``optimize_background``: whether to optimise ``background`` too, which
+        the caller composites on; ``device``: of the tensors; if it is missing, the nearest one.
 
         Raises:
             ImageError: not an SVG, or with something that shapes cannot show.
@@ -145,13 +141,12 @@ class OptimizableSvg:
         if verbose:
             shapes = sum(bool(element.paths) for element in elements)
             print(f"{path}: {len(elements)} elements, {shapes} of them shapes")
-        self.background = torch.ones(3, device=self.device, requires_grad=optimize_background)
+        self.background = torch.ones(3, device=self.device)
         """sRGB, shape (3,)."""
         self._optimizers = [optimizer for element in elements for optimizer in element.optimizers]
         if optimize_background:
             default = self.settings.retrieve("default")[0]
-            groups = [{"params": [self.background], "lr": default["color_lr"]}]
-            self._optimizers.append(make_optimizer(default, groups, COLORS))
+            self._optimizers.append(optimized(default, [self.background], default["color_lr"], COLORS))
 
     def build_scene(self) -> tuple[int, int, list[Shape], list[ShapeGroup]]:
         """Return the canvas' width and height [px], and the current shapes and groups."""

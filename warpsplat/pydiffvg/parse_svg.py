@@ -18,7 +18,6 @@ from warpsplat.pydiffvg.shape import Path, Shape, ShapeGroup, path_of
 from warpsplat.scene import Cap, Join, Rule
 from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size, view_box
-from warpsplat.svg.shapes import LineStyle
 from warpsplat.svg.shapes import Shape as Drawn
 from warpsplat.svg.structure import read_shapes
 
@@ -43,20 +42,12 @@ def svg_to_scene(filename: str | FilePath) -> Scene:
 
 
 def parse_scene(node: ElementTree.Element) -> Scene:
-    """Return the scene of a document's root element, as ``ElementTree.fromstring`` gives it.
-
-    Raises:
-        ImageError: see ``svg_to_scene``.
-    """
+    """Return the scene of a document's root element; see ``svg_to_scene``."""
     return _read(ElementTree.tostring(node, encoding="unicode"))
 
 
 def root_and_size(text: str) -> tuple[dict[str, str], tuple[float, float]]:
-    """Return the attributes of an SVG's root, and its width and height [px].
-
-    Raises:
-        ImageError: not an SVG, or one without a size.
-    """
+    """Return the attributes of an SVG's root, and its width and height [px]."""
     root = inspect_svg(text).root
     size = svg_size(root)
     if size is None:
@@ -95,6 +86,7 @@ def _group(parts: list[Drawn], first: int) -> tuple[list[Path], ShapeGroup]:
     subpaths = parts[0].subpaths
     paths = [path_of(subpath, is_closed=subpath.is_closed or stroke is None) for subpath in subpaths]
     line = stroke.line if stroke else None
+    is_plain = not line or (line.cap == Cap.ROUND and line.join == Join.ROUND and not line.dashes)
     width = torch.tensor(line.width / 2 if line else 0.5)
     for number, path in enumerate(paths):
         path.stroke_width = width
@@ -105,21 +97,13 @@ def _group(parts: list[Drawn], first: int) -> tuple[list[Path], ShapeGroup]:
         parts[0].rule == Rule.EVENODD,
         _color(stroke) if stroke else None,
         id=name,
-        line=line if line and not _is_plain(line) else None,
+        line=None if is_plain else line,
     )
     return paths, group
 
 
-def _is_plain(line: LineStyle) -> bool:
-    return line.cap == Cap.ROUND and line.join == Join.ROUND and not line.dashes
-
-
 def _color(part: Drawn) -> Color:
-    """Return the paint of a fill or stroke.
-
-    Raises:
-        ImageError: a paint that pydiffvg does not have.
-    """
+    """Return the paint of a fill or stroke."""
     paint = part.paint
     if isinstance(paint, FlatColor):
         return torch.tensor([*paint.color, part.opacity * paint.opacity])
@@ -131,8 +115,7 @@ def _color(part: Drawn) -> Color:
 def gradient_of(paint: Gradient, opacity: float) -> LinearGradient | RadialGradient:
     """Return a gradient as pydiffvg's, its stops' opacities multiplied by ``opacity``.
 
-    Raises:
-        ImageError: a gradient that pydiffvg does not have.
+    An ``ImageError`` names what pydiffvg's gradients do not have.
     """
     if paint.spread != "pad":
         raise ImageError(f"uses a gradient with spreadMethod {paint.spread}, not supported by pydiffvg")

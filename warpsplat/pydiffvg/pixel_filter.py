@@ -19,11 +19,7 @@ class PixelFilter:
     """[px], shape ()."""
 
     def check(self) -> None:
-        """Check that the filter is supported.
-
-        Raises:
-            UsageError: it is not.
-        """
+        """Raise a ``UsageError`` if the filter is not supported."""
         radius = float(self.radius)
         if self.type != FilterType.box or radius != 0.5:
             name = getattr(self.type, "name", self.type)

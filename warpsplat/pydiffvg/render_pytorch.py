@@ -11,9 +11,8 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.kernels import constants
-from warpsplat.pydiffvg.arguments import SceneArguments
+from warpsplat.pydiffvg.arguments import SceneArguments, serialize_cached
 from warpsplat.pydiffvg.assemble import assemble
-from warpsplat.pydiffvg.cache import serialize_cached
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.layout import Layout, make_layout
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
@@ -61,15 +60,8 @@ class RenderFunction:
     ) -> list[Any]:
         """Return a scene as further arguments of ``apply``: its width, its height and ``SceneArguments``.
 
-        Args:
-            canvas_width: [canvas units]
-            canvas_height: [canvas units]
-            shapes: all shapes that the groups refer to.
-            shape_groups: from back to front.
-            filter: only the default, the box of a pixel, is supported.
-            output_type: only ``color`` is supported.
-            use_prefiltering: ignored: images are never sampled.
-            eval_positions: must be empty.
+        The canvas has canvas units; the groups, from back to front, refer to ``shapes``. Of the others, only
+        the defaults are supported, and ``use_prefiltering`` is ignored: images are never sampled.
 
         Raises:
             UsageError: something that cannot be rendered.
@@ -94,14 +86,9 @@ class RenderFunction:
     ) -> Tensor:
         """Render a scene; gradients flow to all of its tensors and to the background.
 
-        Args:
-            width: [px]
-            height: [px]
-            num_samples_x: ignored: a pixel is the mean over its whole area.
-            num_samples_y: ignored.
-            seed: ignored: nothing is random.
-            background_image: sRGB and opacity, shape (height, width, 4); or sRGB, (height, width, 3).
-            args: the result of ``serialize_scene``.
+        ``background_image``: sRGB and opacity, shape (height, width, 4); or sRGB, (height, width, 3);
+        ``args``: the result of ``serialize_scene``. The numbers of samples and the seed are ignored: a pixel
+        is the mean over its whole area.
 
         Returns:
             sRGB and opacity in [0, 1], float32, shape (height, width, 4). As in DiffVG a pixel is the mean of
@@ -112,20 +99,15 @@ class RenderFunction:
         """
         if len(args) != 3 or not isinstance(args[2], SceneArguments):
             raise UsageError("RenderFunction.apply takes what RenderFunction.serialize_scene gave, unchanged")
-        return render_scene(args[2], int(width), int(height), background_image)
+        return _render(args[2], int(width), int(height), background_image)
 
     @staticmethod
     def render_grad(*_: Any) -> Tensor:
-        """Refuse to render gradients of translations.
-
-        Raises:
-            UsageError: always.
-        """
+        """Refuse to render gradients of translations by a ``UsageError``."""
         raise UsageError("RenderFunction.render_grad, gradients of each pixel, is not supported")
 
 
-def render_scene(scene: SceneArguments, width: int, height: int, background: Tensor | None) -> Tensor:
-    """Render a serialized scene, see ``RenderFunction.apply``."""
+def _render(scene: SceneArguments, width: int, height: int, background: Tensor | None) -> Tensor:
     began = time.perf_counter()
     device = get_device()
     if background is not None:
@@ -155,11 +137,7 @@ def render_scene(scene: SceneArguments, width: int, height: int, background: Ten
 
 
 def _with_opacity(background: Tensor, width: int, height: int) -> Tensor:
-    """Return a background of shape (height, width, 3 or 4) with an opacity, shape (height, width, 4).
-
-    Raises:
-        UsageError: it has another shape.
-    """
+    """Return a background of shape (height, width, 3 or 4) with an opacity, shape (height, width, 4)."""
     if background.shape[2:] == (3,):
         background = torch.nn.functional.pad(background, (0, 1), value=1.0)
     if tuple(background.shape) != (height, width, 4):

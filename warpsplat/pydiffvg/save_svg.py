@@ -33,17 +33,10 @@ def save_svg(
     use_gamma: bool = False,
     background: str | None = None,
 ) -> None:
-    """Write a scene as an SVG file.
+    """Write a scene, see ``RenderFunction.serialize_scene``, as an SVG file; missing folders are made.
 
-    Args:
-        filename: of the SVG; missing folders are made.
-        width: of the canvas [canvas units].
-        height: of the canvas [canvas units].
-        shapes: all shapes that the groups refer to.
-        shape_groups: from back to front.
-        use_gamma: whether viewers raise all colours to the power 1 / 2.2, as ``imwrite`` does.
-        background: style of the root element, as ``background: #fff``, for browsers; LIVE's copy of DiffVG
-            has it.
+    ``use_gamma``: whether viewers raise all colours to the power 1 / 2.2, as ``imwrite`` does;
+    ``background``: style of the root element, as ``background: #fff``, for browsers, as in LIVE's copy.
     """
     root = ElementTree.Element(
         "svg",

@@ -108,12 +108,10 @@ class ShapeGroup:
 def from_svg_path(
     path_str: str, shape_to_canvas: Tensor | None = None, force_close: bool = False
 ) -> list[Path]:
-    """Return the subpaths of SVG path data, with arcs as cubics.
+    """Return the subpaths of SVG path data (a ``d`` attribute), with arcs as cubics.
 
-    Args:
-        path_str: value of a ``d`` attribute.
-        shape_to_canvas: affine map that the points are transformed by, shape (3, 3).
-        force_close: whether to close all subpaths.
+    ``shape_to_canvas``: affine map that the points are transformed by, shape (3, 3); ``force_close``: whether
+    to close all subpaths.
     """
     paths = [path_of(subpath, is_closed=force_close or None) for subpath in cubics(path_str, keep_dots=False)]
     if shape_to_canvas is not None:

@@ -28,10 +28,8 @@ def contour_sizes(segments: int, is_closed: bool) -> list[int]:
 def contours_around(segments: Tensor, radii: Tensor, is_closed: bool) -> Tensor:
     """Return the control points of the contours around strokes, shape (stroke, point, 2).
 
-    Args:
-        segments: control points of cubics, shape (stroke, segment, 4, 2).
-        radii: half widths as a cubic's control values, shape (stroke, segment, 4).
-        is_closed: whether the last segment ends at the first.
+    ``segments``: control points of cubics, shape (stroke, segment, 4, 2); ``radii``: half widths as a cubic's
+    control values, shape (stroke, segment, 4); ``is_closed``: whether the last segment ends at the first.
     """
     center, normal, radius = _samples(segments, radii)
     left = _cubics(center + radius * normal)

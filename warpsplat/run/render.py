@@ -58,11 +58,11 @@ def render(
     if not isinstance(scene, Scene):
         text = text_of(scene, svg_name_of(scene))
         own = size_of(text, svg_name_of(scene))
-        zoom = _zoom(own, width, height, scale)
+        zoom = zoom_of(own, width, height, scale)
         with backend_on(device, threads) as backend:
             return _with_opacity(_draw_svg(text, own, renderer, zoom, backend))
     size = (scene.canvas.width, scene.canvas.height)
-    zoom = _zoom(size, width, height, scale)
+    zoom = zoom_of(size, width, height, scale)
     if renderer == "viewer":
         return render(save_svg(scene), scale=zoom, renderer="viewer")
     viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
@@ -71,7 +71,7 @@ def render(
         return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
 
 
-def _zoom(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:
+def zoom_of(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:
     """Return the pixels per unit of a picture of ``size`` that is drawn with this width, height or scale."""
     if scale is not None and (width is not None or height is not None):
         raise UsageError("give either a scale, or a width and height")

@@ -166,45 +166,20 @@ class Engine:
             self._stream = stream
 
 
-class EngineCache:
-    """The engines used last, as many as are allowed."""
+engines: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
+"""Those used last, by the keys of their specifications."""
 
-    def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, spec: RenderSpec) -> Engine:
-        """Return the engine of ``spec``, recorded if there is none."""
-        with self._lock:
-            engine = self._kept.pop(spec.key, None) or Engine(spec)
-            self._kept[spec.key] = engine
-            while len(self._kept) > 1 and (
-                len(self._kept) > KEPT or sum(each.bytes for each in self._kept.values()) > KEPT_BYTES
-            ):
-                self._kept.popitem(last=False)
-            return engine
-
-    def clear(self) -> None:
-        """Drop all engines."""
-        with self._lock:
-            self._kept.clear()
-
-
-ENGINES = EngineCache()
+_engines_lock = threading.Lock()
 
 
 def clear_cache() -> None:
     """Free the renderers that are kept for further calls. They are recorded again when they are needed."""
-    ENGINES.clear()
+    with _engines_lock:
+        engines.clear()
 
 
 def check_memory(spec: RenderSpec, count: int = 1) -> None:
-    """Check that there is memory for ``count`` images.
-
-    Raises:
-        UsageError: the device is neither a CPU nor CUDA.
-        ResourceError: there is not enough.
-    """
+    """Raise a ``ResourceError`` if there is no memory for ``count`` images."""
     memory.check_memory(spec.viewport, _warp_device(spec.device), count)
 
 
@@ -213,7 +188,13 @@ def engine_of(spec: RenderSpec) -> Iterator[Engine]:
     """Yield the engine of ``spec``, for this thread alone and on torch's current stream."""
     device = _warp_device(spec.device)
     with device_lock(device), _on_stream(spec.device):
-        engine = ENGINES.get(spec)
+        with _engines_lock:
+            engine = engines.pop(spec.key, None) or Engine(spec)
+            engines[spec.key] = engine
+            while len(engines) > 1 and (
+                len(engines) > KEPT or sum(each.bytes for each in engines.values()) > KEPT_BYTES
+            ):
+                engines.popitem(last=False)
         with engine.lock:
             engine.follow(spec.device)
             yield engine
@@ -230,11 +211,7 @@ _start = functools.cache(start_warp)
 
 
 def _warp_device(device: torch.device) -> wp.Device:
-    """Return Warp's device, starting Warp.
-
-    Raises:
-        UsageError: the device is neither a CPU nor CUDA.
-    """
+    """Return Warp's device, starting Warp."""
     if device.type not in ("cpu", "cuda"):
         raise UsageError(f"tensors are on {device}, neither on the CPU nor on CUDA")
     _start()

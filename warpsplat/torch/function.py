@@ -9,15 +9,15 @@ from typing import Any
 import torch
 from torch.autograd.function import once_differentiable
 
-from warpsplat.errors import UsageError, shown
+from warpsplat.errors import UsageError
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Viewport
-from warpsplat.rendering.memory import MOST_SIDE
 from warpsplat.rendering.models import Model
+from warpsplat.run.render import zoom_of
 from warpsplat.scene import Canvas
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import RenderSpec, check_memory, engine_of
-from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of
+from warpsplat.torch.tensors import TABLE, SceneTensors, attributes_of, check_finite
 
 Tensor = torch.Tensor
 
@@ -52,7 +52,8 @@ def render(
     scenes = [scene] if isinstance(scene, SceneTensors) else list(scene)
     if not scenes:
         raise UsageError("no scene to render")
-    model, threads = model_of(renderer), threads or torch.get_num_threads()
+    model = renderer_of(renderer).default_model if isinstance(renderer, str) else renderer
+    threads = threads or torch.get_num_threads()
     specs = []
     for one in scenes:
         viewport = viewport_of(one.layout.canvas, width, height)
@@ -87,53 +88,16 @@ def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
     return image[..., :3] + (1 - image[..., 3:]) * below
 
 
-def check_finite(values: Mapping[str, Tensor]) -> None:
-    """Check that all numbers are finite, with one transfer from the device.
-
-    Raises:
-        ValueError: one is not.
-    """
-    finite = torch.stack([value.detach().isfinite().all() for value in values.values()]).tolist()
-    if not all(finite):
-        wrong = ", ".join(name for name, fine in zip(values, finite, strict=True) if not fine)
-        raise ValueError(f"{wrong}: numbers that are not finite")
-
-
 def is_opaque(scene: SceneTensors) -> bool:
     """Return whether a shape is so opaque that its adjoint cannot divide by what it lets through."""
     return bool((scene.value(TABLE["opacities"]).detach() > OPACITY_RANGE[1]).any())
 
 
-def model_of(renderer: str | Model) -> Model:
-    """Return the model of a name, or the model itself.
-
-    Raises:
-        UsageError: there is no such model.
-    """
-    return renderer_of(renderer).default_model if isinstance(renderer, str) else renderer
-
-
 def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewport:
-    """Return the viewport of an image of a canvas; see ``render``.
-
-    Raises:
-        UsageError: a side is not a number of pixels, or the two would stretch the canvas.
-    """
-    for name, side in (("width", width), ("height", height)):
-        is_number = isinstance(side, int) and not isinstance(side, bool)
-        if side is not None and not (is_number and 1 <= side <= MOST_SIDE):
-            raise UsageError(f"{name} must be a number of pixels, not {shown(side)}")
-    if width is None and height is None:
-        return Viewport(canvas.width, canvas.height)
-    scale = width / canvas.width if width is not None else (height or 0) / canvas.height
-    fitting = max(1, round(scale * canvas.width)), max(1, round(scale * canvas.height))
-    made = width or fitting[0], height or fitting[1]
-    if abs(made[1] - scale * canvas.height) > 1:
-        raise UsageError(
-            f"{made[0]}x{made[1]} px would stretch a canvas of {canvas.width}x{canvas.height}; "
-            f"leave out the height or take {fitting[1]}"
-        )
-    return Viewport(*made, scale)
+    """Return the viewport of an image of a canvas; see ``render``."""
+    zoom = zoom_of((canvas.width, canvas.height), width, height, None)
+    fitting = max(1, round(zoom * canvas.width)), max(1, round(zoom * canvas.height))
+    return Viewport(width or fitting[0], height or fitting[1], zoom)
 
 
 class _Render(torch.autograd.Function):

@@ -10,7 +10,7 @@ import torch
 from warpsplat.fit.optimizer import units_of
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.scene import IndexArray, Scene
+from warpsplat.scene import Scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import render
 from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
@@ -29,8 +29,11 @@ class Module(torch.nn.Module):
             if name not in fixed:
                 self.register_parameter(name, torch.nn.Parameter(torch.tensor(getattr(scene, name))))
         self._twins: torch.Tensor | None
-        tied = torch.tensor(same_points(scene)) if scene.twin.any() else None
-        self.register_buffer("_twins", tied, persistent=False)
+        """Row of the point that each point is tied to, its own or its twin's."""
+        rows = np.arange(len(scene.points))
+        for i in np.flatnonzero(scene.twin):  # ascending: the shape before may be a twin itself
+            rows[scene.first[i] : scene.first[i + 1]] = rows[scene.first[i - 1] : scene.first[i]]
+        self.register_buffer("_twins", torch.tensor(rows) if scene.twin.any() else None, persistent=False)
 
     def tensors(self) -> SceneTensors:
         """Return the scene of the parameters, through which gradients flow to them."""
@@ -48,9 +51,7 @@ class Module(torch.nn.Module):
     ) -> list[dict[str, Any]]:
         """Return an optimiser's parameter groups: each attribute with its learning rate in a run.
 
-        Args:
-            settings: of the run; default: ``Settings()``.
-            rate: factor of all learning rates.
+        ``settings``: of the run, default: ``Settings()``; ``rate``: factor of all learning rates.
         """
         settings = settings or Settings()
         units = units_of(settings, self._layout.canvas)
@@ -78,11 +79,3 @@ class Module(torch.nn.Module):
     def to_svg(self) -> str:
         """Return the text of an SVG file of the scene."""
         return write_svg(self.scene())
-
-
-def same_points(scene: Scene) -> IndexArray:
-    """Return for each point its own row, or that of the twin's point that it is tied to, shape (point,)."""
-    rows = np.arange(len(scene.points))
-    for i in np.flatnonzero(scene.twin):  # ascending: the shape before may be a twin itself
-        rows[scene.first[i] : scene.first[i + 1]] = rows[scene.first[i - 1] : scene.first[i]]
-    return rows

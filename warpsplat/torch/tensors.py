@@ -52,12 +52,9 @@ class SceneTensors:
     def of(
         scene: Scene, device: torch.device | str | None = None, *, requires_grad: bool = False
     ) -> SceneTensors:
-        """Return copies of all attributes of ``scene``.
+        """Return copies of all attributes of ``scene`` on a device, by default the CPU.
 
-        Args:
-            scene: structure and values.
-            device: default: the CPU.
-            requires_grad: whether the attributes that some shape has require gradients.
+        ``requires_grad``: whether the attributes that some shape has require gradients.
         """
         values = {name: torch.tensor(getattr(scene, name), device=device) for name in TABLE}
         if requires_grad:
@@ -83,17 +80,25 @@ class SceneTensors:
         Raises:
             ValueError: a value is not finite.
         """
-        arrays: dict[str, Any] = {}
-        for name, value in self.values.items():
-            array = value.detach().cpu().numpy()
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} holds numbers that are not finite")
-            arrays[name] = np.clip(array, *limits(TABLE[name])).astype(np.float32)
+        check_finite(self.values)
+        arrays: dict[str, Any] = {
+            name: np.clip(value.detach().cpu().numpy(), *limits(TABLE[name])).astype(np.float32)
+            for name, value in self.values.items()
+        }
         scene = replace(self.layout, **arrays)
         twin = scene.twin.copy()
         for i in np.flatnonzero(twin).tolist():  # twins whose points have come apart are two shapes
             twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
         return replace(scene, twin=twin)
+
+
+def check_finite(values: Mapping[str, torch.Tensor]) -> None:
+    """Raise a ``ValueError`` if a number is not finite, with one transfer from the device."""
+    each = [value.detach().isfinite().all() for value in values.values()]
+    finite = torch.stack(each).tolist() if each else []
+    if not all(finite):
+        wrong = ", ".join(name for name, fine in zip(values, finite, strict=True) if not fine)
+        raise ValueError(f"{wrong}: numbers that are not finite")
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:

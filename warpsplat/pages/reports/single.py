@@ -33,7 +33,6 @@ from warpsplat.pages.reports.pictures import (
 from warpsplat.pages.reports.shapes import contributions, listing, matched
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
-from warpsplat.svg.page import picture_view, with_view
 from warpsplat.svg.read import load_kept
 from warpsplat.svg.viewer import draw
 

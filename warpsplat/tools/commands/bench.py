@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import Function, threads_option
+from warpsplat.cli.options import threads_option
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import renderer_names
 
