@@ -24,8 +24,9 @@ from tests.paper.reference.grid import grids, runs_of
 from tests.reference.curves import tensors
 from tests.scenes import canvas, disc, mixed_scene, random_scene
 from warpsplat.errors import CapacityError
-from warpsplat.kernels.constants import PLATEAU, TILE, TILE_PIXELS
+from warpsplat.kernels.constants import TILE, TILE_PIXELS
 from warpsplat.metrics import psnr
+from warpsplat.paper.constants import PLATEAU
 from warpsplat.paper.kernels import splat_coverage
 from warpsplat.paper.models import SplatModel
 from warpsplat.rendering.backend import Backend, Viewport

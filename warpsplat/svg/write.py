@@ -244,7 +244,7 @@ def write_svg(
         per_pixel: Units of the view box to a pixel. Coordinates are whole units, those of splines even ones.
         metadata: Text behind the program's name in the comment that marks the file.
         opacity_scale: Factor on the opacity of solid paths. A splat's plateau is a little below 1
-            (``constants.PLATEAU``): a solid path needs that much less opacity to look the same.
+            (``paper.constants.PLATEAU``): a solid path needs that much less opacity to look the same.
         background: Whether to write the canvas's background.
         title: Title of the picture; empty: none.
         ids: Whether paths, and groups of neighbours of one colour, have identifiers after their colours.

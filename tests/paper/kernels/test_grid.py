@@ -15,7 +15,7 @@ from tests.paper.reference import splat as reference
 from tests.paper.reference.grid import grids, runs_of
 from tests.reference.curves import tensors
 from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
-from warpsplat.kernels import constants
+from warpsplat.paper import constants as paper
 from warpsplat.paper.kernels.strips import row_position
 from warpsplat.paper.models import SplatModel
 from warpsplat.scene import Kind, Scene
@@ -98,7 +98,7 @@ def test_sample_counts_follow_the_size_in_pixels(device: str) -> None:
     # Half way along the chains the strip is about as wide as on average: there the inset is as planned.
     middle = mean[np.abs(mean[:, 0] - 80) < 8]
     inset = 4 * 8 - np.abs(middle[:, 1] - 80).max()
-    assert inset == pytest.approx(constants.ROW_INSET, abs=0.3)
+    assert inset == pytest.approx(paper.ROW_INSET, abs=0.3)
 
 
 @pytest.mark.parametrize("kind", list(Kind))
