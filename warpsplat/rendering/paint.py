@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, padded, picture
+from warpsplat.kernels.paint import flat, gradient_kernels, picture
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
@@ -65,7 +65,7 @@ class Painting:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         kernels = []
         if self.has_gradients:
-            kernels += [padded.ramp_forward, padded.chain_forward, gradient.gradient_forward]
+            kernels += gradient_kernels.FORWARD
         if self._pictures:
             kernels.append(picture.picture_forward)
         for kernel in kernels:
@@ -82,6 +82,6 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         shapes = self._shape_count
         if self.has_gradients:
-            for kernel in (padded.ramp_backward, padded.chain_backward, gradient.gradient_backward):
+            for kernel in gradient_kernels.BACKWARD:
                 program.launch(kernel, shapes, *self._sources, split=True)
         program.launch(flat.flat_backward, shapes, *self._sources, lanes=self._backend.lanes, split=True)

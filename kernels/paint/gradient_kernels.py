@@ -1,0 +1,466 @@
+"""Padded gradients from a circle's centre or along a line, column by column: the most common ones.
+
+The same as ``gradient``, as vector arithmetic: along a column of pixels both coordinates in unit space go by
+constant steps. The colour at t is that of the first stop and, for each interval, the clamped share of its
+second stop times the difference of the two. Two ascending stops (a ramp) have kernels of their own; of more
+(a chain, in any order) only those intervals that a column reaches are computed, which are one or two.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint.gradient import (
+    CHAIN,
+    GENERAL,
+    RAMP,
+    Gradient,
+    StopGrads,
+    between_stops,
+    case_of,
+    frame,
+    is_gradient,
+    parameter,
+    pixel_place,
+    spread_out,
+    to_unit,
+    to_unit_adjoint,
+)
+from warpsplat.kernels.tile import column, total
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
+TINY = wp.constant(1.0e-12)
+
+
+@wp.func
+def rows() -> column:
+    """Return the indices of a column's pixels."""
+    result = column(0.0)
+    for i in range(constants.TILE):
+        result[i] = float(i)
+    return result
+
+
+@wp.func
+def roots(squares: column) -> column:
+    """Return the square root of each element."""
+    result = column(0.0)
+    for i in range(constants.TILE):
+        result[i] = wp.sqrt(squares[i])
+    return result
+
+
+@wp.func
+def share_of_second(t: column, start: wp.float32, width: wp.float32) -> column:
+    """Return the share of the second stop at parameters ``t``."""
+    linear = (t - column(start)) / width
+    return wp.min(wp.max(linear, column(0.0)), column(1.0))
+
+
+@wp.func
+def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
+    """Return the share of an interval's second stop at parameters ``t``; two stops in one place are a
+    step.
+    """
+    if after > before:
+        return share_of_second(t, before, after - before)
+    return wp.min(wp.max(STEEP * (t - column(before)) + column(1.0), column(0.0)), column(1.0))
+
+
+@wp.func
+def color_chain(g: Gradient, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]):
+    """Colour a column of pixels at parameters ``t`` of a chain."""
+    lowest = wp.min(t)
+    highest = wp.max(t)
+    color = g.colors[g.first]
+    red = column(color[0])
+    green = column(color[1])
+    blue = column(color[2])
+    opacity = column(g.opacities[g.first])
+    before = g.offsets[g.first]
+    for k in range(g.first, g.last - 1):
+        after = wp.max(before, g.offsets[k + 1])
+        color = g.colors[k + 1]
+        if lowest >= after:
+            red = column(color[0])
+            green = column(color[1])
+            blue = column(color[2])
+            opacity = column(g.opacities[k + 1])
+        elif highest >= before:
+            share = share_of_next(t, before, after)
+            between = color - g.colors[k]
+            red = red + between[0] * share
+            green = green + between[1] * share
+            blue = blue + between[2] * share
+            opacity = opacity + (g.opacities[k + 1] - g.opacities[k]) * share
+        before = after
+    paint_columns[slot, 0, x] = red
+    paint_columns[slot, 1, x] = green
+    paint_columns[slot, 2, x] = blue
+    paint_columns[slot, 3, x] = opacity
+
+
+def make_forward(name: str, case: int) -> wp.Kernel:
+    """Return the kernel of RAMP, CHAIN or GENERAL gradients."""
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def forward(
+        # In:
+        offset: wp.int32,
+        lane_columns: wp.int32,  # columns of a tile that a thread handles
+        tiles_x: wp.int32,
+        scale: wp.float32,
+        slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+        slot_tile: wp.array[wp.int32],  # [slot_capacity]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        paint: wp.array[wp.int32],  # [shape_count]
+        spread: wp.array[wp.int32],  # [shape_count]
+        frames: wp.array[frame],  # [shape_count]
+        focus: wp.array[wp.vec3],  # [shape_count]
+        stop_first: wp.array[wp.int32],  # [shape_count + 1]
+        stop_offsets: wp.array[wp.float32],  # [stop_count]
+        stop_colors: wp.array[wp.vec3],  # [stop_count]
+        stop_opacities: wp.array[wp.float32],  # [stop_count]
+        # Out:
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
+        paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
+    ):
+        """Colour the pixels of visible slots. One thread a slot and lane."""
+        i, lane = wp.tid()
+        slot = offset + i
+        shape = slot_shape[slot]
+        if shape < 0:
+            return
+        state = slot_state[slot]
+        if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
+            return
+        g = Gradient()
+        g.paint = paint[shape]
+        g.spread = spread[shape]
+        g.frame = frames[shape]
+        g.focus = focus[shape]
+        g.first = stop_first[shape]
+        g.last = stop_first[shape + 1]
+        g.offsets = stop_offsets
+        g.colors = stop_colors
+        g.opacities = stop_opacities
+        if case_of(g) != case:
+            return
+        if case == RAMP:
+            start = g.offsets[g.first]
+            width = g.offsets[g.first + 1] - start
+            low = g.colors[g.first]
+            high = g.colors[g.first + 1]
+            low_opacity = g.opacities[g.first]
+            high_opacity = g.opacities[g.first + 1]
+        down = to_unit(g.frame, wp.vec2(g.frame[0], g.frame[1] + 1.0 / scale))
+        row = rows()
+        for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+            if case == GENERAL:
+                for y in range(constants.TILE):
+                    place = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
+                    t = spread_out(g.spread, parameter(g.paint, g.focus, place)[0])
+                    at = between_stops(g, t[0])
+                    color = (1.0 - at.share) * g.colors[at.low] + at.share * g.colors[at.high]
+                    p = constants.TILE * x + y
+                    for channel in range(3):
+                        paint_pixels[slot, channel, p] = color[channel]
+                    opacity = g.opacities[at.low]
+                    opacity += at.share * (g.opacities[at.high] - opacity)
+                    paint_pixels[slot, 3, p] = opacity
+            else:
+                top = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                ts = column(top[0]) + down[0] * row
+                if g.paint != constants.LINEAR:
+                    v = column(top[1]) + down[1] * row
+                    ts = roots(wp.cw_mul(ts, ts) + wp.cw_mul(v, v))
+                if case == RAMP:
+                    share = share_of_second(ts, start, width)
+                    paint_columns[slot, 0, x] = column(low[0]) + (high[0] - low[0]) * share
+                    paint_columns[slot, 1, x] = column(low[1]) + (high[1] - low[1]) * share
+                    paint_columns[slot, 2, x] = column(low[2]) + (high[2] - low[2]) * share
+                    paint_columns[slot, 3, x] = column(low_opacity) + (high_opacity - low_opacity) * share
+                else:
+                    color_chain(g, ts, slot, x, paint_columns)
+
+    return forward
+
+
+@wp.func
+def chain_backward_column(
+    g: Gradient, grads: StopGrads, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+) -> column:
+    """Add the gradients of a chain's stops in a column of pixels; return those of ``t``.
+
+    The first stop takes all of a column's gradient but what the share of its interval passes on to the next
+    one, and so on. The offset of a stop that counts as lying where one before it does has no gradient.
+    """
+    red = paint_columns[slot, 0, x]
+    green = paint_columns[slot, 1, x]
+    blue = paint_columns[slot, 2, x]
+    opacity = paint_columns[slot, 3, x]
+    lowest = wp.min(t)
+    highest = wp.max(t)
+    color_rest = wp.vec3(total(red), total(green), total(blue))
+    opacity_rest = total(opacity)
+    slope = column(0.0)
+    at = g.first
+    before = g.offsets[g.first]
+    own_before = int(1)
+    for k in range(g.first, g.last - 1):
+        after = wp.max(before, g.offsets[k + 1])
+        own = wp.where(g.offsets[k + 1] >= before, 1, 0)
+        if lowest >= after:
+            at = k + 1
+        elif highest >= before:
+            share = share_of_next(t, before, after)
+            on = wp.vec3(
+                total(wp.cw_mul(share, red)),
+                total(wp.cw_mul(share, green)),
+                total(wp.cw_mul(share, blue)),
+            )
+            opacity_on = total(wp.cw_mul(share, opacity))
+            grads.colors[k] = grads.colors[k] + (color_rest - on)
+            grads.opacities[k] = grads.opacities[k] + (opacity_rest - opacity_on)
+            color_rest = on
+            opacity_rest = opacity_on
+            at = k + 1
+            if after > before:
+                between = g.colors[k + 1] - g.colors[k]
+                step = between[0] * red + between[1] * green + between[2] * blue
+                step = step + (g.opacities[k + 1] - g.opacities[k]) * opacity
+                step = step / (after - before)
+                # Beyond the two stops nothing changes with t.
+                step = wp.cw_mul(step, wp.min(STEEP * share, column(1.0)))
+                step = wp.cw_mul(step, wp.min(STEEP * (column(1.0) - share), column(1.0)))
+                later = total(wp.cw_mul(share, step))
+                if own_before == 1:
+                    grads.offsets[k] = grads.offsets[k] + (later - total(step))
+                if own == 1:
+                    grads.offsets[k + 1] = grads.offsets[k + 1] - later
+                slope = slope + step
+        before = after
+        own_before = own
+    grads.colors[at] = grads.colors[at] + color_rest
+    grads.opacities[at] = grads.opacities[at] + opacity_rest
+    return slope
+
+
+@wp.func
+def general_backward_column(
+    sums: frame,
+    g: Gradient,
+    grads: StopGrads,
+    slot: wp.int32,
+    tile: wp.int32,
+    tiles_x: wp.int32,
+    x: wp.int32,
+    scale: wp.float32,
+    paint_pixels: wp.array3d[wp.float32],
+) -> frame:
+    """Add the gradients of the stops in a column of pixels; return the frame's, added to ``sums``."""
+    for y in range(constants.TILE):
+        p = constants.TILE * x + y
+        color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
+        opacity = paint_pixels[slot, 3, p]
+        place = to_unit(g.frame, pixel_place(tile, tiles_x, x, y, scale))
+        raw = parameter(g.paint, g.focus, place)
+        t = spread_out(g.spread, raw[0])
+        at = between_stops(g, t[0])
+        low_share = 1.0 - at.share
+        grads.colors[at.low] = grads.colors[at.low] + low_share * color
+        grads.colors[at.high] = grads.colors[at.high] + at.share * color
+        grads.opacities[at.low] = grads.opacities[at.low] + low_share * opacity
+        grads.opacities[at.high] = grads.opacities[at.high] + at.share * opacity
+        if at.width > 0.0:
+            step = wp.dot(color, g.colors[at.high] - g.colors[at.low])
+            step += opacity * (g.opacities[at.high] - g.opacities[at.low])
+            by_t = step / at.width
+            if at.low_is_own == 1:
+                grads.offsets[at.low] = grads.offsets[at.low] - low_share * by_t
+            if at.high_is_own == 1:
+                grads.offsets[at.high] = grads.offsets[at.high] - at.share * by_t
+            m = (-by_t * t[1]) * to_unit_adjoint(g.frame, wp.vec2(raw[1], raw[2]))
+            sums += frame(m[0], m[1], place[0] * m[0], place[0] * m[1], place[1] * m[0], place[1] * m[1])
+    return sums
+
+
+def make_backward(name: str, case: int) -> wp.Kernel:
+    """Return the adjoint of RAMP, CHAIN or GENERAL gradients."""
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def backward(
+        # In:
+        offset: wp.int32,
+        tiles_x: wp.int32,
+        scale: wp.float32,
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_tile: wp.array[wp.int32],  # [slot_capacity]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        paint: wp.array[wp.int32],  # [shape_count]
+        spread: wp.array[wp.int32],  # [shape_count]
+        frames: wp.array[frame],  # [shape_count]
+        focus: wp.array[wp.vec3],  # [shape_count]
+        stop_first: wp.array[wp.int32],  # [shape_count + 1]
+        stop_offsets: wp.array[wp.float32],  # [stop_count]
+        stop_colors: wp.array[wp.vec3],  # [stop_count]
+        stop_opacities: wp.array[wp.float32],  # [stop_count]
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
+        paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
+        # Out:
+        frames_grad: wp.array[frame],  # [shape_count] written
+        stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+        stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+        stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
+    ):
+        """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated
+        as a constant. One thread a shape.
+        """
+        shape = offset + wp.tid()
+        if not is_gradient(paint[shape]):
+            return
+        g = Gradient()
+        g.paint = paint[shape]
+        g.spread = spread[shape]
+        g.frame = frames[shape]
+        g.focus = focus[shape]
+        g.first = stop_first[shape]
+        g.last = stop_first[shape + 1]
+        g.offsets = stop_offsets
+        g.colors = stop_colors
+        g.opacities = stop_opacities
+        if case_of(g) != case:
+            return
+        grads = StopGrads()
+        grads.offsets = stop_offsets_grad
+        grads.colors = stop_colors_grad
+        grads.opacities = stop_opacities_grad
+        zero = column(0.0)
+        one = column(1.0)
+        if case == RAMP:
+            start = g.offsets[g.first]
+            width = g.offsets[g.first + 1] - start
+            between = g.colors[g.first + 1] - g.colors[g.first]
+            opacity_between = g.opacities[g.first + 1] - g.opacities[g.first]
+            red = zero
+            green = zero
+            blue = zero
+            opacity = zero
+            red_high = zero
+            green_high = zero
+            blue_high = zero
+            opacity_high = zero
+            by_t = zero
+            by_t_high = zero
+        else:
+            for i in range(g.first, g.last):
+                grads.offsets[i] = 0.0
+                grads.colors[i] = wp.vec3(0.0, 0.0, 0.0)
+                grads.opacities[i] = 0.0
+        linear = g.paint == constants.LINEAR
+        down = to_unit(g.frame, wp.vec2(g.frame[0], g.frame[1] + 1.0 / scale))
+        row = rows()
+        if case == GENERAL:
+            sums = frame()
+        # Derivatives by the point in unit space, and the same times each coordinate.
+        by_u = zero
+        by_v = zero
+        u_by_u = zero
+        u_by_v = zero
+        v_by_u = zero
+        v_by_v = zero
+        columns = int(constants.TILE)  # a loop that is not unrolled, which takes long to compile
+        for slot in range(slot_first[shape], slot_last[shape]):
+            state = slot_state[slot]
+            if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+                for x in range(columns):
+                    if case == GENERAL:
+                        sums = general_backward_column(
+                            sums, g, grads, slot, slot_tile[slot], tiles_x, x, scale, paint_pixels
+                        )
+                    else:
+                        top = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                        u = column(top[0]) + down[0] * row
+                        v = column(top[1]) + down[1] * row
+                        t = u
+                        if not linear:
+                            t = roots(wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                        if case == RAMP:
+                            share = share_of_second(t, start, width)
+                            g_red = paint_columns[slot, 0, x]
+                            g_green = paint_columns[slot, 1, x]
+                            g_blue = paint_columns[slot, 2, x]
+                            g_opacity = paint_columns[slot, 3, x]
+                            red = red + g_red
+                            green = green + g_green
+                            blue = blue + g_blue
+                            opacity = opacity + g_opacity
+                            red_high = red_high + wp.cw_mul(share, g_red)
+                            green_high = green_high + wp.cw_mul(share, g_green)
+                            blue_high = blue_high + wp.cw_mul(share, g_blue)
+                            opacity_high = opacity_high + wp.cw_mul(share, g_opacity)
+                            slope = between[0] * g_red + between[1] * g_green + between[2] * g_blue
+                            slope = (slope + opacity_between * g_opacity) / width
+                            # Beyond the stops nothing changes with t.
+                            slope = wp.cw_mul(slope, wp.min(STEEP * share, one))
+                            slope = wp.cw_mul(slope, wp.min(STEEP * (one - share), one))
+                            by_t = by_t + slope
+                            by_t_high = by_t_high + wp.cw_mul(share, slope)
+                        else:
+                            slope = chain_backward_column(g, grads, t, slot, x, paint_columns)
+                        if linear:
+                            by_u = by_u + slope
+                            u_by_u = u_by_u + wp.cw_mul(u, slope)
+                            v_by_u = v_by_u + wp.cw_mul(v, slope)
+                        else:
+                            slope = wp.cw_div(slope, wp.max(t, column(TINY)))
+                            to_u = wp.cw_mul(u, slope)
+                            to_v = wp.cw_mul(v, slope)
+                            by_u = by_u + to_u
+                            by_v = by_v + to_v
+                            u_by_u = u_by_u + wp.cw_mul(u, to_u)
+                            u_by_v = u_by_v + wp.cw_mul(u, to_v)
+                            v_by_u = v_by_u + wp.cw_mul(v, to_u)
+                            v_by_v = v_by_v + wp.cw_mul(v, to_v)
+        if case == RAMP:
+            high = wp.vec3(total(red_high), total(green_high), total(blue_high))
+            grads.colors[g.first] = wp.vec3(total(red), total(green), total(blue)) - high
+            grads.colors[g.first + 1] = high
+            grads.opacities[g.first] = total(opacity) - total(opacity_high)
+            grads.opacities[g.first + 1] = total(opacity_high)
+            grads.offsets[g.first] = total(by_t_high) - total(by_t)
+            grads.offsets[g.first + 1] = -total(by_t_high)
+        if case == GENERAL:
+            frames_grad[shape] = sums
+        else:
+            # A frame that moves shifts the points in unit space the other way.
+            origin = to_unit_adjoint(g.frame, wp.vec2(-total(by_u), -total(by_v)))
+            along = to_unit_adjoint(g.frame, wp.vec2(-total(u_by_u), -total(u_by_v)))
+            across = to_unit_adjoint(g.frame, wp.vec2(-total(v_by_u), -total(v_by_v)))
+            frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+
+    return backward
+
+
+CASES = (("ramp", RAMP), ("chain", CHAIN), ("gradient", GENERAL))
+FORWARD = [make_forward(f"{name}_forward", case) for name, case in CASES]
+BACKWARD = [make_backward(f"{name}_backward", case) for name, case in CASES]
+
+
+@wp.kernel
+def tie_circles(
+    # In:
+    offset: wp.int32,
+    circular: wp.array[wp.int32],  # [shape_count] 1 where the frame is a circle's
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] updated
+):
+    """Keep circles round: the second axis is the first one, turned by a right angle."""
+    i = offset + wp.tid()
+    if circular[i] == 1:
+        g = frames_grad[i]
+        x = g[2] + g[5]
+        y = g[3] - g[4]
+        frames_grad[i] = frame(g[0], g[1], x, y, -y, x)
