@@ -83,27 +83,21 @@ def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
 
 
 @wp.struct
-class Gradient:
-    """A shape's gradient; its stops are the rows [first, last)."""
+class Gradients:
+    """Paints of all shapes; the stops of one are the rows from its ``stop_first`` to that of the next."""
 
-    paint: wp.int32
-    spread: wp.int32
-    frame: frame
-    focus: wp.vec3
-    first: wp.int32
-    last: wp.int32
-    offsets: wp.array[wp.float32]
-    colors: wp.array[wp.vec3]
-    opacities: wp.array[wp.float32]
-
-
-@wp.struct
-class StopGrads:
-    """Gradients of all stops."""
-
-    offsets: wp.array[wp.float32]
-    colors: wp.array[wp.vec3]
-    opacities: wp.array[wp.float32]
+    paint: wp.array[wp.int32]  # [shape_count]
+    spread: wp.array[wp.int32]  # [shape_count]
+    frames: wp.array[frame]  # [shape_count]
+    focus: wp.array[wp.vec3]  # [shape_count]
+    stop_first: wp.array[wp.int32]  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32]  # [stop_count]
+    stop_colors: wp.array[wp.vec3]  # [stop_count]
+    stop_opacities: wp.array[wp.float32]  # [stop_count]
+    frames_grad: wp.array[frame]  # the gradients are written
+    stop_offsets_grad: wp.array[wp.float32]
+    stop_colors_grad: wp.array[wp.vec3]
+    stop_opacities_grad: wp.array[wp.float32]
 
 
 @wp.struct
@@ -119,24 +113,26 @@ class Between:
 
 
 @wp.func
-def between_stops(g: Gradient, t: wp.float32) -> Between:
+def between_stops(g: Gradients, shape: wp.int32, t: wp.float32) -> Between:
     """Return the two stops that ``t`` lies between; before the first and after the last, only that one
     counts.
     """
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
     result = Between()
-    result.low = g.first
-    result.high = g.first
+    result.low = first
+    result.high = first
     result.share = 0.0
     result.width = 0.0
     result.low_is_own = 1
     result.high_is_own = 1
-    before = g.offsets[g.first]
+    before = g.stop_offsets[first]
     own_before = int(1)
     if t >= before:
-        result.low = g.last - 1
-        result.high = g.last - 1
-        for i in range(g.first + 1, g.last):
-            offset = g.offsets[i]
+        result.low = last - 1
+        result.high = last - 1
+        for i in range(first + 1, last):
+            offset = g.stop_offsets[i]
             own = int(1)
             if offset < before:
                 offset = before
@@ -155,16 +151,18 @@ def between_stops(g: Gradient, t: wp.float32) -> Between:
 
 
 @wp.func
-def case_of(g: Gradient) -> wp.int32:
+def case_of(g: Gradients, shape: wp.int32) -> wp.int32:
     """Return which kernels draw a gradient: those of ramps (padded, centred, two ascending stops), of chains
     (padded, centred, three stops or more in any order), or the general ones.
     """
-    if g.spread != constants.PAD or g.focus[0] != 0.0 or g.focus[1] != 0.0 or g.focus[2] != 0.0:
+    if g.spread[shape] != constants.PAD or wp.length_sq(g.focus[shape]) != 0.0:
         return GENERAL
-    if g.last - g.first > 2:
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
+    if last - first > 2:
         return CHAIN
-    if g.last - g.first == 2:
-        if g.offsets[g.first + 1] > g.offsets[g.first]:
+    if last - first == 2:
+        if g.stop_offsets[first + 1] > g.stop_offsets[first]:
             return RAMP
     return GENERAL
 

@@ -13,8 +13,7 @@ from warpsplat.kernels.paint.gradient import (
     CHAIN,
     GENERAL,
     RAMP,
-    Gradient,
-    StopGrads,
+    Gradients,
     between_stops,
     case_of,
     frame,
@@ -69,31 +68,35 @@ def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
 
 
 @wp.func
-def color_chain(g: Gradient, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]):
+def color_chain(
+    g: Gradients, shape: wp.int32, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+):
     """Colour a column of pixels at parameters ``t`` of a chain."""
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
     lowest = wp.min(t)
     highest = wp.max(t)
-    color = g.colors[g.first]
+    color = g.stop_colors[first]
     red = column(color[0])
     green = column(color[1])
     blue = column(color[2])
-    opacity = column(g.opacities[g.first])
-    before = g.offsets[g.first]
-    for k in range(g.first, g.last - 1):
-        after = wp.max(before, g.offsets[k + 1])
-        color = g.colors[k + 1]
+    opacity = column(g.stop_opacities[first])
+    before = g.stop_offsets[first]
+    for k in range(first, last - 1):
+        after = wp.max(before, g.stop_offsets[k + 1])
+        color = g.stop_colors[k + 1]
         if lowest >= after:
             red = column(color[0])
             green = column(color[1])
             blue = column(color[2])
-            opacity = column(g.opacities[k + 1])
+            opacity = column(g.stop_opacities[k + 1])
         elif highest >= before:
             share = share_of_next(t, before, after)
-            between = color - g.colors[k]
+            between = color - g.stop_colors[k]
             red = red + between[0] * share
             green = green + between[1] * share
             blue = blue + between[2] * share
-            opacity = opacity + (g.opacities[k + 1] - g.opacities[k]) * share
+            opacity = opacity + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * share
         before = after
     paint_columns[slot, 0, x] = red
     paint_columns[slot, 1, x] = green
@@ -114,14 +117,7 @@ def make_forward(name: str, case: int) -> wp.Kernel:
         slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
         slot_tile: wp.array[wp.int32],  # [slot_capacity]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
-        paint: wp.array[wp.int32],  # [shape_count]
-        spread: wp.array[wp.int32],  # [shape_count]
-        frames: wp.array[frame],  # [shape_count]
-        focus: wp.array[wp.vec3],  # [shape_count]
-        stop_first: wp.array[wp.int32],  # [shape_count + 1]
-        stop_offsets: wp.array[wp.float32],  # [stop_count]
-        stop_colors: wp.array[wp.vec3],  # [stop_count]
-        stop_opacities: wp.array[wp.float32],  # [stop_count]
+        g: Gradients,
         # Out:
         paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
         paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
@@ -133,46 +129,38 @@ def make_forward(name: str, case: int) -> wp.Kernel:
         if shape < 0:
             return
         state = slot_state[slot]
-        if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
+        if not is_gradient(g.paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
             return
-        g = Gradient()
-        g.paint = paint[shape]
-        g.spread = spread[shape]
-        g.frame = frames[shape]
-        g.focus = focus[shape]
-        g.first = stop_first[shape]
-        g.last = stop_first[shape + 1]
-        g.offsets = stop_offsets
-        g.colors = stop_colors
-        g.opacities = stop_opacities
-        if case_of(g) != case:
+        if case_of(g, shape) != case:
             return
+        first = g.stop_first[shape]
+        f = g.frames[shape]
         if case == RAMP:
-            start = g.offsets[g.first]
-            width = g.offsets[g.first + 1] - start
-            low = g.colors[g.first]
-            high = g.colors[g.first + 1]
-            low_opacity = g.opacities[g.first]
-            high_opacity = g.opacities[g.first + 1]
-        down = to_unit(g.frame, wp.vec2(g.frame[0], g.frame[1] + 1.0 / scale))
+            start = g.stop_offsets[first]
+            width = g.stop_offsets[first + 1] - start
+            low = g.stop_colors[first]
+            high = g.stop_colors[first + 1]
+            low_opacity = g.stop_opacities[first]
+            high_opacity = g.stop_opacities[first + 1]
+        down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
         row = rows()
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
             if case == GENERAL:
                 for y in range(constants.TILE):
-                    place = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
-                    t = spread_out(g.spread, parameter(g.paint, g.focus, place)[0])
-                    at = between_stops(g, t[0])
-                    color = (1.0 - at.share) * g.colors[at.low] + at.share * g.colors[at.high]
+                    place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
+                    t = spread_out(g.spread[shape], parameter(g.paint[shape], g.focus[shape], place)[0])
+                    at = between_stops(g, shape, t[0])
+                    color = (1.0 - at.share) * g.stop_colors[at.low] + at.share * g.stop_colors[at.high]
                     p = constants.TILE * x + y
                     for channel in range(3):
                         paint_pixels[slot, channel, p] = color[channel]
-                    opacity = g.opacities[at.low]
-                    opacity += at.share * (g.opacities[at.high] - opacity)
+                    opacity = g.stop_opacities[at.low]
+                    opacity += at.share * (g.stop_opacities[at.high] - opacity)
                     paint_pixels[slot, 3, p] = opacity
             else:
-                top = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                 ts = column(top[0]) + down[0] * row
-                if g.paint != constants.LINEAR:
+                if g.paint[shape] != constants.LINEAR:
                     v = column(top[1]) + down[1] * row
                     ts = roots(wp.cw_mul(ts, ts) + wp.cw_mul(v, v))
                 if case == RAMP:
@@ -182,14 +170,14 @@ def make_forward(name: str, case: int) -> wp.Kernel:
                     paint_columns[slot, 2, x] = column(low[2]) + (high[2] - low[2]) * share
                     paint_columns[slot, 3, x] = column(low_opacity) + (high_opacity - low_opacity) * share
                 else:
-                    color_chain(g, ts, slot, x, paint_columns)
+                    color_chain(g, shape, ts, slot, x, paint_columns)
 
     return forward
 
 
 @wp.func
 def chain_backward_column(
-    g: Gradient, grads: StopGrads, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+    g: Gradients, shape: wp.int32, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
 ) -> column:
     """Add the gradients of a chain's stops in a column of pixels; return those of ``t``.
 
@@ -200,17 +188,19 @@ def chain_backward_column(
     green = paint_columns[slot, 1, x]
     blue = paint_columns[slot, 2, x]
     opacity = paint_columns[slot, 3, x]
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
     lowest = wp.min(t)
     highest = wp.max(t)
     color_rest = wp.vec3(total(red), total(green), total(blue))
     opacity_rest = total(opacity)
     slope = column(0.0)
-    at = g.first
-    before = g.offsets[g.first]
+    at = first
+    before = g.stop_offsets[first]
     own_before = int(1)
-    for k in range(g.first, g.last - 1):
-        after = wp.max(before, g.offsets[k + 1])
-        own = wp.where(g.offsets[k + 1] >= before, 1, 0)
+    for k in range(first, last - 1):
+        after = wp.max(before, g.stop_offsets[k + 1])
+        own = wp.where(g.stop_offsets[k + 1] >= before, 1, 0)
         if lowest >= after:
             at = k + 1
         elif highest >= before:
@@ -221,37 +211,37 @@ def chain_backward_column(
                 total(wp.cw_mul(share, blue)),
             )
             opacity_on = total(wp.cw_mul(share, opacity))
-            grads.colors[k] = grads.colors[k] + (color_rest - on)
-            grads.opacities[k] = grads.opacities[k] + (opacity_rest - opacity_on)
+            g.stop_colors_grad[k] = g.stop_colors_grad[k] + (color_rest - on)
+            g.stop_opacities_grad[k] = g.stop_opacities_grad[k] + (opacity_rest - opacity_on)
             color_rest = on
             opacity_rest = opacity_on
             at = k + 1
             if after > before:
-                between = g.colors[k + 1] - g.colors[k]
+                between = g.stop_colors[k + 1] - g.stop_colors[k]
                 step = between[0] * red + between[1] * green + between[2] * blue
-                step = step + (g.opacities[k + 1] - g.opacities[k]) * opacity
+                step = step + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * opacity
                 step = step / (after - before)
                 # Beyond the two stops nothing changes with t.
                 step = wp.cw_mul(step, wp.min(STEEP * share, column(1.0)))
                 step = wp.cw_mul(step, wp.min(STEEP * (column(1.0) - share), column(1.0)))
                 later = total(wp.cw_mul(share, step))
                 if own_before == 1:
-                    grads.offsets[k] = grads.offsets[k] + (later - total(step))
+                    g.stop_offsets_grad[k] = g.stop_offsets_grad[k] + (later - total(step))
                 if own == 1:
-                    grads.offsets[k + 1] = grads.offsets[k + 1] - later
+                    g.stop_offsets_grad[k + 1] = g.stop_offsets_grad[k + 1] - later
                 slope = slope + step
         before = after
         own_before = own
-    grads.colors[at] = grads.colors[at] + color_rest
-    grads.opacities[at] = grads.opacities[at] + opacity_rest
+    g.stop_colors_grad[at] = g.stop_colors_grad[at] + color_rest
+    g.stop_opacities_grad[at] = g.stop_opacities_grad[at] + opacity_rest
     return slope
 
 
 @wp.func
 def general_backward_column(
     sums: frame,
-    g: Gradient,
-    grads: StopGrads,
+    g: Gradients,
+    shape: wp.int32,
     slot: wp.int32,
     tile: wp.int32,
     tiles_x: wp.int32,
@@ -264,24 +254,24 @@ def general_backward_column(
         p = constants.TILE * x + y
         color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
         opacity = paint_pixels[slot, 3, p]
-        place = to_unit(g.frame, pixel_place(tile, tiles_x, x, y, scale))
-        raw = parameter(g.paint, g.focus, place)
-        t = spread_out(g.spread, raw[0])
-        at = between_stops(g, t[0])
+        place = to_unit(g.frames[shape], pixel_place(tile, tiles_x, x, y, scale))
+        raw = parameter(g.paint[shape], g.focus[shape], place)
+        t = spread_out(g.spread[shape], raw[0])
+        at = between_stops(g, shape, t[0])
         low_share = 1.0 - at.share
-        grads.colors[at.low] = grads.colors[at.low] + low_share * color
-        grads.colors[at.high] = grads.colors[at.high] + at.share * color
-        grads.opacities[at.low] = grads.opacities[at.low] + low_share * opacity
-        grads.opacities[at.high] = grads.opacities[at.high] + at.share * opacity
+        g.stop_colors_grad[at.low] = g.stop_colors_grad[at.low] + low_share * color
+        g.stop_colors_grad[at.high] = g.stop_colors_grad[at.high] + at.share * color
+        g.stop_opacities_grad[at.low] = g.stop_opacities_grad[at.low] + low_share * opacity
+        g.stop_opacities_grad[at.high] = g.stop_opacities_grad[at.high] + at.share * opacity
         if at.width > 0.0:
-            step = wp.dot(color, g.colors[at.high] - g.colors[at.low])
-            step += opacity * (g.opacities[at.high] - g.opacities[at.low])
+            step = wp.dot(color, g.stop_colors[at.high] - g.stop_colors[at.low])
+            step += opacity * (g.stop_opacities[at.high] - g.stop_opacities[at.low])
             by_t = step / at.width
             if at.low_is_own == 1:
-                grads.offsets[at.low] = grads.offsets[at.low] - low_share * by_t
+                g.stop_offsets_grad[at.low] = g.stop_offsets_grad[at.low] - low_share * by_t
             if at.high_is_own == 1:
-                grads.offsets[at.high] = grads.offsets[at.high] - at.share * by_t
-            m = (-by_t * t[1]) * to_unit_adjoint(g.frame, wp.vec2(raw[1], raw[2]))
+                g.stop_offsets_grad[at.high] = g.stop_offsets_grad[at.high] - at.share * by_t
+            m = (-by_t * t[1]) * to_unit_adjoint(g.frames[shape], wp.vec2(raw[1], raw[2]))
             sums += frame(m[0], m[1], place[0] * m[0], place[0] * m[1], place[1] * m[0], place[1] * m[1])
     return sums
 
@@ -299,51 +289,28 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         slot_last: wp.array[wp.int32],  # [shape_count]
         slot_tile: wp.array[wp.int32],  # [slot_capacity]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
-        paint: wp.array[wp.int32],  # [shape_count]
-        spread: wp.array[wp.int32],  # [shape_count]
-        frames: wp.array[frame],  # [shape_count]
-        focus: wp.array[wp.vec3],  # [shape_count]
-        stop_first: wp.array[wp.int32],  # [shape_count + 1]
-        stop_offsets: wp.array[wp.float32],  # [stop_count]
-        stop_colors: wp.array[wp.vec3],  # [stop_count]
-        stop_opacities: wp.array[wp.float32],  # [stop_count]
+        g: Gradients,
         paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
         paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
-        # Out:
-        frames_grad: wp.array[frame],  # [shape_count] written
-        stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
-        stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
-        stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
     ):
         """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated
         as a constant. One thread a shape.
         """
         shape = offset + wp.tid()
-        if not is_gradient(paint[shape]):
+        if not is_gradient(g.paint[shape]):
             return
-        g = Gradient()
-        g.paint = paint[shape]
-        g.spread = spread[shape]
-        g.frame = frames[shape]
-        g.focus = focus[shape]
-        g.first = stop_first[shape]
-        g.last = stop_first[shape + 1]
-        g.offsets = stop_offsets
-        g.colors = stop_colors
-        g.opacities = stop_opacities
-        if case_of(g) != case:
+        if case_of(g, shape) != case:
             return
-        grads = StopGrads()
-        grads.offsets = stop_offsets_grad
-        grads.colors = stop_colors_grad
-        grads.opacities = stop_opacities_grad
+        first = g.stop_first[shape]
+        last = g.stop_first[shape + 1]
+        f = g.frames[shape]
         zero = column(0.0)
         one = column(1.0)
         if case == RAMP:
-            start = g.offsets[g.first]
-            width = g.offsets[g.first + 1] - start
-            between = g.colors[g.first + 1] - g.colors[g.first]
-            opacity_between = g.opacities[g.first + 1] - g.opacities[g.first]
+            start = g.stop_offsets[first]
+            width = g.stop_offsets[first + 1] - start
+            between = g.stop_colors[first + 1] - g.stop_colors[first]
+            opacity_between = g.stop_opacities[first + 1] - g.stop_opacities[first]
             red = zero
             green = zero
             blue = zero
@@ -355,12 +322,12 @@ def make_backward(name: str, case: int) -> wp.Kernel:
             by_t = zero
             by_t_high = zero
         else:
-            for i in range(g.first, g.last):
-                grads.offsets[i] = 0.0
-                grads.colors[i] = wp.vec3(0.0, 0.0, 0.0)
-                grads.opacities[i] = 0.0
-        linear = g.paint == constants.LINEAR
-        down = to_unit(g.frame, wp.vec2(g.frame[0], g.frame[1] + 1.0 / scale))
+            for i in range(first, last):
+                g.stop_offsets_grad[i] = 0.0
+                g.stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
+                g.stop_opacities_grad[i] = 0.0
+        linear = g.paint[shape] == constants.LINEAR
+        down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
         row = rows()
         if case == GENERAL:
             sums = frame()
@@ -378,10 +345,10 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                 for x in range(columns):
                     if case == GENERAL:
                         sums = general_backward_column(
-                            sums, g, grads, slot, slot_tile[slot], tiles_x, x, scale, paint_pixels
+                            sums, g, shape, slot, slot_tile[slot], tiles_x, x, scale, paint_pixels
                         )
                     else:
-                        top = to_unit(g.frame, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                        top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                         u = column(top[0]) + down[0] * row
                         v = column(top[1]) + down[1] * row
                         t = u
@@ -409,7 +376,7 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                             by_t = by_t + slope
                             by_t_high = by_t_high + wp.cw_mul(share, slope)
                         else:
-                            slope = chain_backward_column(g, grads, t, slot, x, paint_columns)
+                            slope = chain_backward_column(g, shape, t, slot, x, paint_columns)
                         if linear:
                             by_u = by_u + slope
                             u_by_u = u_by_u + wp.cw_mul(u, slope)
@@ -426,20 +393,20 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                             v_by_v = v_by_v + wp.cw_mul(v, to_v)
         if case == RAMP:
             high = wp.vec3(total(red_high), total(green_high), total(blue_high))
-            grads.colors[g.first] = wp.vec3(total(red), total(green), total(blue)) - high
-            grads.colors[g.first + 1] = high
-            grads.opacities[g.first] = total(opacity) - total(opacity_high)
-            grads.opacities[g.first + 1] = total(opacity_high)
-            grads.offsets[g.first] = total(by_t_high) - total(by_t)
-            grads.offsets[g.first + 1] = -total(by_t_high)
+            g.stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
+            g.stop_colors_grad[first + 1] = high
+            g.stop_opacities_grad[first] = total(opacity) - total(opacity_high)
+            g.stop_opacities_grad[first + 1] = total(opacity_high)
+            g.stop_offsets_grad[first] = total(by_t_high) - total(by_t)
+            g.stop_offsets_grad[first + 1] = -total(by_t_high)
         if case == GENERAL:
-            frames_grad[shape] = sums
+            g.frames_grad[shape] = sums
         else:
             # A frame that moves shifts the points in unit space the other way.
-            origin = to_unit_adjoint(g.frame, wp.vec2(-total(by_u), -total(by_v)))
-            along = to_unit_adjoint(g.frame, wp.vec2(-total(u_by_u), -total(u_by_v)))
-            across = to_unit_adjoint(g.frame, wp.vec2(-total(v_by_u), -total(v_by_v)))
-            frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+            origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
+            along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
+            across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
+            g.frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
     return backward
 

@@ -12,6 +12,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint import flat, gradient_kernels, picture
+from warpsplat.kernels.paint.gradient import Gradients
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
@@ -59,6 +60,9 @@ class Painting:
                 "paint_slots": 1 if self.is_flat else slots,
             },
         )
+        self._gradients = Gradients()
+        for name in Gradients.vars:
+            setattr(self._gradients, name, parameters.arrays[name])
         self._sources = (self.buffers, inputs.bins.buffers, parameters.arrays, inputs.viewport)
 
     def forward(self, program: Program) -> None:
@@ -74,6 +78,7 @@ class Painting:
                 (self._slots, self._backend.lanes),
                 *self._sources,
                 self._pictures or {},
+                {"g": self._gradients},
                 lane_columns=self._backend.lane_size,
                 split=True,
             )
@@ -83,5 +88,5 @@ class Painting:
         shapes = self._shape_count
         if self.has_gradients:
             for kernel in gradient_kernels.BACKWARD:
-                program.launch(kernel, shapes, *self._sources, split=True)
+                program.launch(kernel, shapes, *self._sources, g=self._gradients, split=True)
         program.launch(flat.flat_backward, shapes, *self._sources, lanes=self._backend.lanes, split=True)
