@@ -113,12 +113,10 @@ class Between:
 
 
 @wp.func
-def between_stops(g: Gradients, shape: wp.int32, t: wp.float32) -> Between:
+def between_stops(offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32, t: wp.float32) -> Between:
     """Return the two stops that ``t`` lies between; before the first and after the last, only that one
     counts.
     """
-    first = g.stop_first[shape]
-    last = g.stop_first[shape + 1]
     result = Between()
     result.low = first
     result.high = first
@@ -126,13 +124,13 @@ def between_stops(g: Gradients, shape: wp.int32, t: wp.float32) -> Between:
     result.width = 0.0
     result.low_is_own = 1
     result.high_is_own = 1
-    before = g.stop_offsets[first]
+    before = offsets[first]
     own_before = int(1)
     if t >= before:
         result.low = last - 1
         result.high = last - 1
         for i in range(first + 1, last):
-            offset = g.stop_offsets[i]
+            offset = offsets[i]
             own = int(1)
             if offset < before:
                 offset = before

@@ -134,6 +134,10 @@ def make_forward(name: str, case: int) -> wp.Kernel:
         if case_of(g, shape) != case:
             return
         first = g.stop_first[shape]
+        last = g.stop_first[shape + 1]
+        own_paint = g.paint[shape]
+        own_focus = g.focus[shape]
+        own_spread = g.spread[shape]
         f = g.frames[shape]
         if case == RAMP:
             start = g.stop_offsets[first]
@@ -148,8 +152,8 @@ def make_forward(name: str, case: int) -> wp.Kernel:
             if case == GENERAL:
                 for y in range(constants.TILE):
                     place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
-                    t = spread_out(g.spread[shape], parameter(g.paint[shape], g.focus[shape], place)[0])
-                    at = between_stops(g, shape, t[0])
+                    t = spread_out(own_spread, parameter(own_paint, own_focus, place)[0])
+                    at = between_stops(g.stop_offsets, first, last, t[0])
                     color = (1.0 - at.share) * g.stop_colors[at.low] + at.share * g.stop_colors[at.high]
                     p = constants.TILE * x + y
                     for channel in range(3):
@@ -160,7 +164,7 @@ def make_forward(name: str, case: int) -> wp.Kernel:
             else:
                 top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
                 ts = column(top[0]) + down[0] * row
-                if g.paint[shape] != constants.LINEAR:
+                if own_paint != constants.LINEAR:
                     v = column(top[1]) + down[1] * row
                     ts = roots(wp.cw_mul(ts, ts) + wp.cw_mul(v, v))
                 if case == RAMP:
@@ -250,14 +254,20 @@ def general_backward_column(
     paint_pixels: wp.array3d[wp.float32],
 ) -> frame:
     """Add the gradients of the stops in a column of pixels; return the frame's, added to ``sums``."""
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
+    f = g.frames[shape]
+    paint = g.paint[shape]
+    focus = g.focus[shape]
+    spread = g.spread[shape]
     for y in range(constants.TILE):
         p = constants.TILE * x + y
         color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
         opacity = paint_pixels[slot, 3, p]
-        place = to_unit(g.frames[shape], pixel_place(tile, tiles_x, x, y, scale))
-        raw = parameter(g.paint[shape], g.focus[shape], place)
-        t = spread_out(g.spread[shape], raw[0])
-        at = between_stops(g, shape, t[0])
+        place = to_unit(f, pixel_place(tile, tiles_x, x, y, scale))
+        raw = parameter(paint, focus, place)
+        t = spread_out(spread, raw[0])
+        at = between_stops(g.stop_offsets, first, last, t[0])
         low_share = 1.0 - at.share
         g.stop_colors_grad[at.low] = g.stop_colors_grad[at.low] + low_share * color
         g.stop_colors_grad[at.high] = g.stop_colors_grad[at.high] + at.share * color
@@ -271,7 +281,7 @@ def general_backward_column(
                 g.stop_offsets_grad[at.low] = g.stop_offsets_grad[at.low] - low_share * by_t
             if at.high_is_own == 1:
                 g.stop_offsets_grad[at.high] = g.stop_offsets_grad[at.high] - at.share * by_t
-            m = (-by_t * t[1]) * to_unit_adjoint(g.frames[shape], wp.vec2(raw[1], raw[2]))
+            m = (-by_t * t[1]) * to_unit_adjoint(f, wp.vec2(raw[1], raw[2]))
             sums += frame(m[0], m[1], place[0] * m[0], place[0] * m[1], place[1] * m[0], place[1] * m[1])
     return sums
 

@@ -13,6 +13,7 @@ import warp as wp
 
 from tests.kernels import trials
 from tests.kernels.modules import kernel_folders
+from warpsplat.kernels import pixels
 
 ANGLES = np.linspace(-20, 20, 4001).astype(np.float32)
 AGES = np.arange(0, 3000, 7, dtype=np.int32)
@@ -105,3 +106,7 @@ def test_no_kernel_calls_the_c_library() -> None:
     assert len(files) > 20
     found = {path: library_calls(path.read_text(encoding="utf-8")) for path in files}
     assert not {path: calls for path, calls in found.items() if calls}
+
+
+def test_modules_are_installed_under_the_package() -> None:
+    assert pixels.tiles_to_pixels.module.name == "warpsplat.kernels.pixels"
