@@ -241,53 +241,84 @@ def chain_backward_column(
     return slope
 
 
-@wp.func
-def general_backward_column(
-    sums: frame,
-    g: Gradients,
-    shape: wp.int32,
-    slot: wp.int32,
-    tile: wp.int32,
+@wp.kernel
+def gradient_backward(
+    # In:
+    offset: wp.int32,
     tiles_x: wp.int32,
-    x: wp.int32,
     scale: wp.float32,
-    paint_pixels: wp.array3d[wp.float32],
-) -> frame:
-    """Add the gradients of the stops in a column of pixels; return the frame's, added to ``sums``."""
-    first = g.stop_first[shape]
-    last = g.stop_first[shape + 1]
-    f = g.frames[shape]
-    paint = g.paint[shape]
-    focus = g.focus[shape]
-    spread = g.spread[shape]
-    for y in range(constants.TILE):
-        p = constants.TILE * x + y
-        color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
-        opacity = paint_pixels[slot, 3, p]
-        place = to_unit(f, pixel_place(tile, tiles_x, x, y, scale))
-        raw = parameter(paint, focus, place)
-        t = spread_out(spread, raw[0])
-        at = between_stops(g.stop_offsets, first, last, t[0])
-        low_share = 1.0 - at.share
-        g.stop_colors_grad[at.low] = g.stop_colors_grad[at.low] + low_share * color
-        g.stop_colors_grad[at.high] = g.stop_colors_grad[at.high] + at.share * color
-        g.stop_opacities_grad[at.low] = g.stop_opacities_grad[at.low] + low_share * opacity
-        g.stop_opacities_grad[at.high] = g.stop_opacities_grad[at.high] + at.share * opacity
-        if at.width > 0.0:
-            step = wp.dot(color, g.stop_colors[at.high] - g.stop_colors[at.low])
-            step += opacity * (g.stop_opacities[at.high] - g.stop_opacities[at.low])
-            by_t = step / at.width
-            if at.low_is_own == 1:
-                g.stop_offsets_grad[at.low] = g.stop_offsets_grad[at.low] - low_share * by_t
-            if at.high_is_own == 1:
-                g.stop_offsets_grad[at.high] = g.stop_offsets_grad[at.high] - at.share * by_t
-            m = (-by_t * t[1]) * to_unit_adjoint(f, wp.vec2(raw[1], raw[2]))
-            sums += frame(m[0], m[1], place[0] * m[0], place[0] * m[1], place[1] * m[0], place[1] * m[1])
-    return sums
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_tile: wp.array[wp.int32],  # [slot_capacity]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
+    spread: wp.array[wp.int32],  # [shape_count]
+    frames: wp.array[frame],  # [shape_count]
+    focus: wp.array[wp.vec3],  # [shape_count]
+    stop_first: wp.array[wp.int32],  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32],  # [stop_count]
+    stop_colors: wp.array[wp.vec3],  # [stop_count]
+    stop_opacities: wp.array[wp.float32],  # [stop_count]
+    g: Gradients,  # the same, for ``case_of``
+    paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] gradients of colour and opacity
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] written
+    stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+    stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+    stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
+):
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated as
+    a constant. One thread a shape.
+    """
+    shape = offset + wp.tid()
+    if not is_gradient(paint[shape]):
+        return
+    first = stop_first[shape]
+    last = stop_first[shape + 1]
+    if case_of(g, shape) != GENERAL:
+        return
+    for i in range(first, last):
+        stop_offsets_grad[i] = 0.0
+        stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
+        stop_opacities_grad[i] = 0.0
+    f = frames[shape]
+    origin = wp.vec2(0.0, 0.0)
+    along = wp.vec2(0.0, 0.0)
+    across = wp.vec2(0.0, 0.0)
+    for slot in range(slot_first[shape], slot_last[shape]):
+        state = slot_state[slot]
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+            for p in range(constants.TILE * constants.TILE):
+                color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
+                opacity = paint_pixels[slot, 3, p]
+                place = to_unit(
+                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
+                )
+                raw = parameter(paint[shape], focus[shape], place)
+                t = spread_out(spread[shape], raw[0])
+                at = between_stops(stop_offsets, first, last, t[0])
+                low_share = 1.0 - at.share
+                stop_colors_grad[at.low] = stop_colors_grad[at.low] + low_share * color
+                stop_colors_grad[at.high] = stop_colors_grad[at.high] + at.share * color
+                stop_opacities_grad[at.low] = stop_opacities_grad[at.low] + low_share * opacity
+                stop_opacities_grad[at.high] = stop_opacities_grad[at.high] + at.share * opacity
+                if at.width > 0.0:
+                    step = wp.dot(color, stop_colors[at.high] - stop_colors[at.low])
+                    step += opacity * (stop_opacities[at.high] - stop_opacities[at.low])
+                    by_t = step / at.width
+                    if at.low_is_own == 1:
+                        stop_offsets_grad[at.low] = stop_offsets_grad[at.low] - low_share * by_t
+                    if at.high_is_own == 1:
+                        stop_offsets_grad[at.high] = stop_offsets_grad[at.high] - at.share * by_t
+                    move = (-by_t * t[1]) * to_unit_adjoint(f, wp.vec2(raw[1], raw[2]))
+                    origin += move
+                    along += place[0] * move
+                    across += place[1] * move
+    frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
 
 def make_backward(name: str, case: int) -> wp.Kernel:
-    """Return the adjoint of RAMP, CHAIN or GENERAL gradients."""
+    """Return the adjoint of RAMP or CHAIN gradients."""
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
@@ -301,7 +332,6 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         g: Gradients,
         paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
-        paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
     ):
         """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated
         as a constant. One thread a shape.
@@ -339,8 +369,6 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         linear = g.paint[shape] == constants.LINEAR
         down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
         row = rows()
-        if case == GENERAL:
-            sums = frame()
         # Derivatives by the point in unit space, and the same times each coordinate.
         by_u = zero
         by_v = zero
@@ -353,54 +381,49 @@ def make_backward(name: str, case: int) -> wp.Kernel:
             state = slot_state[slot]
             if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
                 for x in range(columns):
-                    if case == GENERAL:
-                        sums = general_backward_column(
-                            sums, g, shape, slot, slot_tile[slot], tiles_x, x, scale, paint_pixels
-                        )
+                    top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                    u = column(top[0]) + down[0] * row
+                    v = column(top[1]) + down[1] * row
+                    t = u
+                    if not linear:
+                        t = roots(wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                    if case == RAMP:
+                        share = share_of_second(t, start, width)
+                        g_red = paint_columns[slot, 0, x]
+                        g_green = paint_columns[slot, 1, x]
+                        g_blue = paint_columns[slot, 2, x]
+                        g_opacity = paint_columns[slot, 3, x]
+                        red = red + g_red
+                        green = green + g_green
+                        blue = blue + g_blue
+                        opacity = opacity + g_opacity
+                        red_high = red_high + wp.cw_mul(share, g_red)
+                        green_high = green_high + wp.cw_mul(share, g_green)
+                        blue_high = blue_high + wp.cw_mul(share, g_blue)
+                        opacity_high = opacity_high + wp.cw_mul(share, g_opacity)
+                        slope = between[0] * g_red + between[1] * g_green + between[2] * g_blue
+                        slope = (slope + opacity_between * g_opacity) / width
+                        # Beyond the stops nothing changes with t.
+                        slope = wp.cw_mul(slope, wp.min(STEEP * share, one))
+                        slope = wp.cw_mul(slope, wp.min(STEEP * (one - share), one))
+                        by_t = by_t + slope
+                        by_t_high = by_t_high + wp.cw_mul(share, slope)
                     else:
-                        top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
-                        u = column(top[0]) + down[0] * row
-                        v = column(top[1]) + down[1] * row
-                        t = u
-                        if not linear:
-                            t = roots(wp.cw_mul(u, u) + wp.cw_mul(v, v))
-                        if case == RAMP:
-                            share = share_of_second(t, start, width)
-                            g_red = paint_columns[slot, 0, x]
-                            g_green = paint_columns[slot, 1, x]
-                            g_blue = paint_columns[slot, 2, x]
-                            g_opacity = paint_columns[slot, 3, x]
-                            red = red + g_red
-                            green = green + g_green
-                            blue = blue + g_blue
-                            opacity = opacity + g_opacity
-                            red_high = red_high + wp.cw_mul(share, g_red)
-                            green_high = green_high + wp.cw_mul(share, g_green)
-                            blue_high = blue_high + wp.cw_mul(share, g_blue)
-                            opacity_high = opacity_high + wp.cw_mul(share, g_opacity)
-                            slope = between[0] * g_red + between[1] * g_green + between[2] * g_blue
-                            slope = (slope + opacity_between * g_opacity) / width
-                            # Beyond the stops nothing changes with t.
-                            slope = wp.cw_mul(slope, wp.min(STEEP * share, one))
-                            slope = wp.cw_mul(slope, wp.min(STEEP * (one - share), one))
-                            by_t = by_t + slope
-                            by_t_high = by_t_high + wp.cw_mul(share, slope)
-                        else:
-                            slope = chain_backward_column(g, shape, t, slot, x, paint_columns)
-                        if linear:
-                            by_u = by_u + slope
-                            u_by_u = u_by_u + wp.cw_mul(u, slope)
-                            v_by_u = v_by_u + wp.cw_mul(v, slope)
-                        else:
-                            slope = wp.cw_div(slope, wp.max(t, column(TINY)))
-                            to_u = wp.cw_mul(u, slope)
-                            to_v = wp.cw_mul(v, slope)
-                            by_u = by_u + to_u
-                            by_v = by_v + to_v
-                            u_by_u = u_by_u + wp.cw_mul(u, to_u)
-                            u_by_v = u_by_v + wp.cw_mul(u, to_v)
-                            v_by_u = v_by_u + wp.cw_mul(v, to_u)
-                            v_by_v = v_by_v + wp.cw_mul(v, to_v)
+                        slope = chain_backward_column(g, shape, t, slot, x, paint_columns)
+                    if linear:
+                        by_u = by_u + slope
+                        u_by_u = u_by_u + wp.cw_mul(u, slope)
+                        v_by_u = v_by_u + wp.cw_mul(v, slope)
+                    else:
+                        slope = wp.cw_div(slope, wp.max(t, column(TINY)))
+                        to_u = wp.cw_mul(u, slope)
+                        to_v = wp.cw_mul(v, slope)
+                        by_u = by_u + to_u
+                        by_v = by_v + to_v
+                        u_by_u = u_by_u + wp.cw_mul(u, to_u)
+                        u_by_v = u_by_v + wp.cw_mul(u, to_v)
+                        v_by_u = v_by_u + wp.cw_mul(v, to_u)
+                        v_by_v = v_by_v + wp.cw_mul(v, to_v)
         if case == RAMP:
             high = wp.vec3(total(red_high), total(green_high), total(blue_high))
             g.stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
@@ -409,21 +432,18 @@ def make_backward(name: str, case: int) -> wp.Kernel:
             g.stop_opacities_grad[first + 1] = total(opacity_high)
             g.stop_offsets_grad[first] = total(by_t_high) - total(by_t)
             g.stop_offsets_grad[first + 1] = -total(by_t_high)
-        if case == GENERAL:
-            g.frames_grad[shape] = sums
-        else:
-            # A frame that moves shifts the points in unit space the other way.
-            origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
-            along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
-            across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
-            g.frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+        # A frame that moves shifts the points in unit space the other way.
+        origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
+        along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
+        across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
+        g.frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
     return backward
 
 
 CASES = (("ramp", RAMP), ("chain", CHAIN), ("gradient", GENERAL))
 FORWARD = [make_forward(f"{name}_forward", case) for name, case in CASES]
-BACKWARD = [make_backward(f"{name}_backward", case) for name, case in CASES]
+BACKWARD = [*(make_backward(f"{name}_backward", case) for name, case in CASES[:2]), gradient_backward]
 
 
 @wp.kernel

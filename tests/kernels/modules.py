@@ -14,11 +14,11 @@ import warpsplat
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
     """Return those that the module defines, by factories too."""
-    return [
-        value
-        for value in vars(module).values()
-        if isinstance(value, wp.Kernel) and value.func.__module__ == module.__name__
+    values = [
+        value for found in vars(module).values() for value in (found if isinstance(found, list) else [found])
     ]
+    kernels = [value for value in values if isinstance(value, wp.Kernel)]
+    return list({k.key: k for k in kernels if k.func.__module__ == module.__name__}.values())
 
 
 def kernel_folders() -> list[Path]:
