@@ -13,12 +13,11 @@ import warpsplat
 
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
-    """Return those that the module defines, by factories too."""
+    """Return those that the module names, alone or in a list."""
     values = [
         value for found in vars(module).values() for value in (found if isinstance(found, list) else [found])
     ]
-    kernels = [value for value in values if isinstance(value, wp.Kernel)]
-    return list({k.key: k for k in kernels if k.func.__module__ == module.__name__}.values())
+    return [value for value in values if isinstance(value, wp.Kernel)]
 
 
 def kernel_folders() -> list[Path]:
@@ -38,4 +37,4 @@ def all_kernels() -> list[wp.Kernel]:
         )
     ]
     modules = map(importlib.import_module, sorted(names))
-    return [kernel for module in modules for kernel in kernels_of(module)]
+    return list(dict.fromkeys(kernel for module in modules for kernel in kernels_of(module)))

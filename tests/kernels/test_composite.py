@@ -86,10 +86,10 @@ def test_removal_costs_match_brute_force(device: str, scene: Scene, weighted: bo
     importance = wp.array(to_tiles(weights)[:, 0], dtype=column, device=device) if weighted else None
     got = renderer.removal_costs(aim, importance)
 
-    def error(shown: Scene) -> np.float64:
+    def error(shown: Scene) -> float:
         off = (render(shown, backend=Backend.on(device)) - target).astype(np.float64)
         papers = (off[..., :3] - paper * off[..., 3:] for paper in (0, 1))
-        return np.mean([weights * each**2 for each in (papers if off.shape[2] == 4 else [off])])
+        return float(np.mean([weights * each**2 for each in (papers if off.shape[2] == 4 else [off])]))
 
     for i in range(len(scene)):
         without = error(scene.take(np.delete(np.arange(len(scene)), i)))

@@ -71,7 +71,7 @@ class ExactCoverage:
         sizes = {"slots": slots, "lanes": lanes, "fill_slots": slots, "stroke_slots": 0}
         if constants.STROKE in self._parts:
             sizes["stroke_slots"] = slots
-        self.buffers = inputs.backend.allocate(ExactBuffers, sizes)
+        self.buffers: CoverageBuffers = inputs.backend.allocate(ExactBuffers, sizes)
         arrays = inputs.parameters.arrays
         self._edges: dict[int, tuple[object, ...]] = dict.fromkeys(self._parts, (outline.buffers, arrays))
         if outline.stroker:

@@ -61,7 +61,7 @@ class Painting:
             },
         )
         self._gradients = Gradients()
-        for name in Gradients.vars:
+        for name in Gradients.vars:  # type: ignore[attr-defined]  # of Warp's struct
             setattr(self._gradients, name, parameters.arrays[name])
         self._sources = (self.buffers, inputs.bins.buffers, parameters.arrays, inputs.viewport)
 

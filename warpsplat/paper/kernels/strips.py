@@ -117,7 +117,7 @@ def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Ker
     control points and a ``Place`` [canvas units].
     """
 
-    @wp.kernel(name=name)
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def forward(
         # In:
         offset: wp.int32,
