@@ -94,10 +94,6 @@ class Gradients:
     stop_offsets: wp.array[wp.float32]  # [stop_count]
     stop_colors: wp.array[wp.vec3]  # [stop_count]
     stop_opacities: wp.array[wp.float32]  # [stop_count]
-    frames_grad: wp.array[frame]  # the gradients are written
-    stop_offsets_grad: wp.array[wp.float32]
-    stop_colors_grad: wp.array[wp.vec3]
-    stop_opacities_grad: wp.array[wp.float32]
 
 
 @wp.struct

@@ -181,7 +181,15 @@ def make_forward(name: str, case: int) -> wp.Kernel:
 
 @wp.func
 def chain_backward_column(
-    g: Gradients, shape: wp.int32, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+    g: Gradients,
+    shape: wp.int32,
+    t: column,
+    slot: wp.int32,
+    x: wp.int32,
+    paint_columns: wp.array3d[column],
+    stop_offsets_grad: wp.array[wp.float32],
+    stop_colors_grad: wp.array[wp.vec3],
+    stop_opacities_grad: wp.array[wp.float32],
 ) -> column:
     """Add the gradients of a chain's stops in a column of pixels; return those of ``t``.
 
@@ -215,8 +223,8 @@ def chain_backward_column(
                 total(wp.cw_mul(share, blue)),
             )
             opacity_on = total(wp.cw_mul(share, opacity))
-            g.stop_colors_grad[k] = g.stop_colors_grad[k] + (color_rest - on)
-            g.stop_opacities_grad[k] = g.stop_opacities_grad[k] + (opacity_rest - opacity_on)
+            stop_colors_grad[k] = stop_colors_grad[k] + (color_rest - on)
+            stop_opacities_grad[k] = stop_opacities_grad[k] + (opacity_rest - opacity_on)
             color_rest = on
             opacity_rest = opacity_on
             at = k + 1
@@ -230,14 +238,14 @@ def chain_backward_column(
                 step = wp.cw_mul(step, wp.min(STEEP * (column(1.0) - share), column(1.0)))
                 later = total(wp.cw_mul(share, step))
                 if own_before == 1:
-                    g.stop_offsets_grad[k] = g.stop_offsets_grad[k] + (later - total(step))
+                    stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
                 if own == 1:
-                    g.stop_offsets_grad[k + 1] = g.stop_offsets_grad[k + 1] - later
+                    stop_offsets_grad[k + 1] = stop_offsets_grad[k + 1] - later
                 slope = slope + step
         before = after
         own_before = own
-    g.stop_colors_grad[at] = g.stop_colors_grad[at] + color_rest
-    g.stop_opacities_grad[at] = g.stop_opacities_grad[at] + opacity_rest
+    stop_colors_grad[at] = stop_colors_grad[at] + color_rest
+    stop_opacities_grad[at] = stop_opacities_grad[at] + opacity_rest
     return slope
 
 
@@ -332,6 +340,11 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         g: Gradients,
         paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
+        # Out:
+        frames_grad: wp.array[frame],  # [shape_count] written
+        stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+        stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+        stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
     ):
         """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated
         as a constant. One thread a shape.
@@ -363,9 +376,9 @@ def make_backward(name: str, case: int) -> wp.Kernel:
             by_t_high = zero
         else:
             for i in range(first, last):
-                g.stop_offsets_grad[i] = 0.0
-                g.stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
-                g.stop_opacities_grad[i] = 0.0
+                stop_offsets_grad[i] = 0.0
+                stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
+                stop_opacities_grad[i] = 0.0
         linear = g.paint[shape] == constants.LINEAR
         down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
         row = rows()
@@ -409,7 +422,17 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                         by_t = by_t + slope
                         by_t_high = by_t_high + wp.cw_mul(share, slope)
                     else:
-                        slope = chain_backward_column(g, shape, t, slot, x, paint_columns)
+                        slope = chain_backward_column(
+                            g,
+                            shape,
+                            t,
+                            slot,
+                            x,
+                            paint_columns,
+                            stop_offsets_grad,
+                            stop_colors_grad,
+                            stop_opacities_grad,
+                        )
                     if linear:
                         by_u = by_u + slope
                         u_by_u = u_by_u + wp.cw_mul(u, slope)
@@ -426,17 +449,17 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                         v_by_v = v_by_v + wp.cw_mul(v, to_v)
         if case == RAMP:
             high = wp.vec3(total(red_high), total(green_high), total(blue_high))
-            g.stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
-            g.stop_colors_grad[first + 1] = high
-            g.stop_opacities_grad[first] = total(opacity) - total(opacity_high)
-            g.stop_opacities_grad[first + 1] = total(opacity_high)
-            g.stop_offsets_grad[first] = total(by_t_high) - total(by_t)
-            g.stop_offsets_grad[first + 1] = -total(by_t_high)
+            stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
+            stop_colors_grad[first + 1] = high
+            stop_opacities_grad[first] = total(opacity) - total(opacity_high)
+            stop_opacities_grad[first + 1] = total(opacity_high)
+            stop_offsets_grad[first] = total(by_t_high) - total(by_t)
+            stop_offsets_grad[first + 1] = -total(by_t_high)
         # A frame that moves shifts the points in unit space the other way.
         origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
         along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
         across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
-        g.frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+        frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
     return backward
 
