@@ -3,14 +3,13 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.elementary import power, sine_and_cosine
+from warpsplat.kernels.elementary import PI, power, sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 BETA1 = wp.constant(0.9)
 BETA2 = wp.constant(0.99)
 EPSILON = wp.constant(1.0e-12)  # the gradients of a mean over 10^6 pixels are about 1e-7
-PI = wp.constant(3.141592653589793)
 
 
 @wp.kernel

@@ -21,13 +21,6 @@ def cubic_weights(t: wp.float32) -> wp.vec4:
 
 
 @wp.func
-def cubic_tangent_weights(t: wp.float32) -> wp.vec4:
-    """Return the derivatives of ``cubic_weights`` by ``t``; they sum to 0."""
-    s = 1.0 - t
-    return wp.vec4(-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t)
-
-
-@wp.func
 def fair_weights(t: wp.float32, pieces: wp.int32) -> wp.vec4:
     """Return weights of the vertex at ``t`` of a cubic flattened to ``pieces`` chords of equal steps h of t.
 
@@ -39,16 +32,6 @@ def fair_weights(t: wp.float32, pieces: wp.int32) -> wp.vec4:
     shift = 0.5 / (float(pieces) * float(pieces))
     curved = wp.vec4(s, 3.0 * t - 2.0, 1.0 - 3.0 * t, t)
     return cubic_weights(t) - shift * curved
-
-
-@wp.func
-def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
-    """Return the index of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from
-    point 0, chain 1 backwards; both end in the middle of the ring.
-    """
-    if chain == 0:
-        return i
-    return (point_count - i) % point_count
 
 
 @wp.func
@@ -147,20 +130,3 @@ def point_weight(
 def cross(a: wp.vec2, b: wp.vec2) -> wp.float32:
     """Return the signed area of the parallelogram of ``a`` and ``b``."""
     return a[0] * b[1] - a[1] * b[0]
-
-
-@wp.func
-def segment_at(t: wp.float32, segment_count: wp.int32) -> wp.int32:
-    """Return the segment that holds parameter ``t`` in [0, segment_count] of a chain."""
-    return wp.clamp(int(wp.floor(t)), 0, segment_count - 1)
-
-
-@wp.func
-def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32:
-    """Return the weight of chain control point ``i`` where the chain is in ``segment``; 0 outside its
-    support.
-    """
-    j = i - 3 * segment
-    if j < 0 or j > 3:
-        return 0.0
-    return weights[j]

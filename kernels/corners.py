@@ -220,30 +220,23 @@ def corners_backward(
         segment_grad[i] = wp.vec3(0.0, 0.0, 0.0)
     outwards = float(0.0)
     for i in range(corner_first[shape], corner_last[shape]):
-        outwards += add_corner_grad(
-            i,
-            corner_start_grad[i],
-            vertex,
-            vertex_next,
-            corner,
-            corner_segments,
-            corner_place,
-            start_grad,
-            end_grad,
-            segment_grad,
-        )
-        outwards += add_corner_grad(
-            corner_next[i],
-            corner_end_grad[i],
-            vertex,
-            vertex_next,
-            corner,
-            corner_segments,
-            corner_place,
-            start_grad,
-            end_grad,
-            segment_grad,
-        )
+        at = int(i)
+        g = corner_start_grad[i]
+        for _ in range(2):
+            outwards += add_corner_grad(
+                at,
+                g,
+                vertex,
+                vertex_next,
+                corner,
+                corner_segments,
+                corner_place,
+                start_grad,
+                end_grad,
+                segment_grad,
+            )
+            at = corner_next[i]
+            g = corner_end_grad[i]
     widths_grad[shape] = 0.5 * scale * outwards / wp.max(half_width(widths[shape], scale), TINY)
     if vertex_last[shape] > vertex_first[shape]:
         last = vertex_last[shape]

@@ -21,10 +21,6 @@ TAN_EIGHTH = wp.constant(0.41421356237309503)  # of pi
 TAN_SIXTEENTH = wp.constant(0.19891236737965800)
 TAN_THREE_SIXTEENTHS = wp.constant(0.66817863791929890)
 
-SQRT_HALF = wp.constant(0.7071067811865476)
-TAIL_MAX = wp.constant(4.0)  # beyond this times the square root of 2, a normal variable has a chance of 8e-9
-HALVINGS = wp.constant(26)  # of an interval of that length: to a float's last bits
-
 
 @wp.func
 def power(base: wp.float32, exponent: wp.int32) -> wp.float32:
@@ -84,44 +80,3 @@ def angle_of(x: wp.float32, y: wp.float32) -> wp.float32:
     if y < 0.0:
         angle = -angle
     return angle
-
-
-@wp.func
-def normal_tail(z: wp.float32) -> wp.float32:
-    """Chance that a normal variable exceeds ``z`` >= 0 standard deviations.
-
-    Up to the square root of 2, by a polynomial in z^2; beyond, by one whose 16th power is the inverse of the
-    complementary error function. Both are Chebyshev interpolants.
-    """
-    x = wp.min(z * SQRT_HALF, TAIL_MAX)
-    if x < 1.0:
-        s = x * x
-        p = 1.12837913 + s * (
-            -0.376123438 + s * (0.112803167 + s * (-0.0267150542 + s * (0.00492176203 + s * -0.000564805987)))
-        )
-        return 0.5 - 0.5 * x * p
-    t = (x - 2.5) / 1.5
-    low = 1.62893424 + t * (0.817421711 + t * (0.421312806 + t * (0.146538078 + t * 0.0466382937)))
-    high = 0.0129177276 + t * (
-        0.00315187556 + t * (0.000746777281 + t * (0.000168796991 + t * 3.4582237e-05))
-    )
-    t2 = t * t
-    r = low + t2 * t2 * t * high
-    r2 = r * r
-    r4 = r2 * r2
-    r8 = r4 * r4
-    return 0.5 / (r8 * r8)
-
-
-@wp.func
-def normal_quantile(tail: wp.float32) -> wp.float32:
-    """Standard deviations that a normal variable exceeds with the chance ``tail``, from 1e-8 to 0.5."""
-    low = float(0.0)
-    high = TAIL_MAX / SQRT_HALF
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if normal_tail(middle) > tail:
-            low = middle
-        else:
-            high = middle
-    return low

@@ -8,12 +8,6 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 
 
 @wp.func
-def bounded_product(a: wp.int32, b: wp.int32) -> wp.int32:
-    """Return ``a`` times ``b``, clamped to [0, COUNT_MAX]."""
-    return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(constants.COUNT_MAX)))
-
-
-@wp.func
 def find_range(ends: wp.array[wp.int32], count: wp.int32, i: wp.int32) -> wp.int32:
     """Return the smallest index with ``ends[index] > i``; ``ends`` is an inclusive prefix sum of ``count``
     entries.

@@ -49,7 +49,6 @@ SMOKE = {
         "cli/test_main.py::test_help_is_quick",
     ),
     "others": (
-        "paper/kernels/test_grid.py::test_adjoint_of_positions",
         "paper/test_splat.py::test_mixed_scenes",
         "paper/test_soft.py::test_image_and_gradients",
         "torch/test_gradients.py::test_exact",

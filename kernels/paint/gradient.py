@@ -4,7 +4,7 @@ A frame maps the gradient's unit space to the canvas; a pixel's centre, mapped b
 linear gradient that is its first coordinate; on a radial one it says which of the circles between the focus
 and the unit circle goes through it: the larger root s of |p - c0 + s c0| = r0 + s (1 - r0). Between two stops
 colours and opacities are interpolated, colours not premultiplied, at t after the spread.
-``padded`` has faster kernels for the common cases, ramps and chains.
+``gradient_kernels`` are faster for the common cases, ramps and chains.
 """
 
 from typing import Any
@@ -16,6 +16,9 @@ from warpsplat.kernels import constants
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 TINY = wp.constant(1.0e-12)
+RAMP = wp.constant(0)
+CHAIN = wp.constant(1)
+GENERAL = wp.constant(2)
 
 frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 """Origin, first axis, second axis."""
@@ -80,6 +83,20 @@ def spread_out(spread: wp.int32, t: wp.float32) -> wp.vec2:
 
 
 @wp.struct
+class Gradients:
+    """Paints of all shapes; the stops of one are the rows from its ``stop_first`` to that of the next."""
+
+    paint: wp.array[wp.int32]  # [shape_count]
+    spread: wp.array[wp.int32]  # [shape_count]
+    frames: wp.array[frame]  # [shape_count]
+    focus: wp.array[wp.vec3]  # [shape_count]
+    stop_first: wp.array[wp.int32]  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32]  # [stop_count]
+    stop_colors: wp.array[wp.vec3]  # [stop_count]
+    stop_opacities: wp.array[wp.float32]  # [stop_count]
+
+
+@wp.struct
 class Between:
     """Position of t among the stops."""
 
@@ -128,33 +145,20 @@ def between_stops(offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
 
 
 @wp.func
-def is_ramp(
-    spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
-) -> wp.bool:
-    """Return whether a gradient is a ramp: padded, centred, with two ascending stops."""
-    if spread != constants.PAD or last - first != 2:
-        return False
-    if focus[0] != 0.0 or focus[1] != 0.0 or focus[2] != 0.0:
-        return False
-    return offsets[first + 1] > offsets[first]
-
-
-@wp.func
-def is_chain(spread: wp.int32, focus: wp.vec3, first: wp.int32, last: wp.int32) -> wp.bool:
-    """Return whether a gradient is a chain: padded, centred, with three stops or more in any order."""
-    if spread != constants.PAD or last - first < 3:
-        return False
-    return focus[0] == 0.0 and focus[1] == 0.0 and focus[2] == 0.0
-
-
-@wp.func
-def is_columnwise(
-    spread: wp.int32, focus: wp.vec3, offsets: wp.array[wp.float32], first: wp.int32, last: wp.int32
-) -> wp.bool:
-    """Return whether a gradient is a ramp or a chain."""
-    if is_ramp(spread, focus, offsets, first, last):
-        return True
-    return is_chain(spread, focus, first, last)
+def case_of(g: Gradients, shape: wp.int32) -> wp.int32:
+    """Return which kernels draw a gradient: those of ramps (padded, centred, two ascending stops), of chains
+    (padded, centred, three stops or more in any order), or the general ones.
+    """
+    if g.spread[shape] != constants.PAD or wp.length_sq(g.focus[shape]) != 0.0:
+        return GENERAL
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
+    if last - first > 2:
+        return CHAIN
+    if last - first == 2:
+        if g.stop_offsets[first + 1] > g.stop_offsets[first]:
+            return RAMP
+    return GENERAL
 
 
 @wp.func
@@ -163,125 +167,3 @@ def pixel_place(tile: wp.int32, tiles_x: wp.int32, x: wp.int32, y: wp.int32, sca
     px = float(constants.TILE * (tile % tiles_x) + x) + 0.5
     py = float(constants.TILE * (tile / tiles_x) + y) + 0.5
     return wp.vec2(px / scale, py / scale)
-
-
-@wp.kernel
-def gradient_forward(
-    # In:
-    offset: wp.int32,
-    lane_columns: wp.int32,  # columns of a tile that a thread handles
-    tiles_x: wp.int32,
-    scale: wp.float32,
-    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_tile: wp.array[wp.int32],  # [slot_capacity]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    paint: wp.array[wp.int32],  # [shape_count]
-    spread: wp.array[wp.int32],  # [shape_count]
-    frames: wp.array[frame],  # [shape_count]
-    focus: wp.array[wp.vec3],  # [shape_count]
-    stop_first: wp.array[wp.int32],  # [shape_count + 1]
-    stop_offsets: wp.array[wp.float32],  # [stop_count]
-    stop_colors: wp.array[wp.vec3],  # [stop_count]
-    stop_opacities: wp.array[wp.float32],  # [stop_count]
-    # Out:
-    paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] colour and opacity, by column
-):
-    """Colour the pixels of visible slots of gradients that go pixel by pixel. One thread a slot and lane."""
-    i, lane = wp.tid()
-    slot = offset + i
-    shape = slot_shape[slot]
-    if shape < 0:
-        return
-    state = slot_state[slot]
-    if not is_gradient(paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
-        return
-    if is_columnwise(spread[shape], focus[shape], stop_offsets, stop_first[shape], stop_first[shape + 1]):
-        return
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        for y in range(constants.TILE):
-            place = to_unit(frames[shape], pixel_place(slot_tile[slot], tiles_x, x, y, scale))
-            raw = parameter(paint[shape], focus[shape], place)
-            t = spread_out(spread[shape], raw[0])
-            at = between_stops(stop_offsets, stop_first[shape], stop_first[shape + 1], t[0])
-            color = (1.0 - at.share) * stop_colors[at.low] + at.share * stop_colors[at.high]
-            p = constants.TILE * x + y
-            paint_pixels[slot, 0, p] = color[0]
-            paint_pixels[slot, 1, p] = color[1]
-            paint_pixels[slot, 2, p] = color[2]
-            low = stop_opacities[at.low]
-            paint_pixels[slot, 3, p] = low + at.share * (stop_opacities[at.high] - low)
-
-
-@wp.kernel
-def gradient_backward(
-    # In:
-    offset: wp.int32,
-    tiles_x: wp.int32,
-    scale: wp.float32,
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
-    slot_tile: wp.array[wp.int32],  # [slot_capacity]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    paint: wp.array[wp.int32],  # [shape_count]
-    spread: wp.array[wp.int32],  # [shape_count]
-    frames: wp.array[frame],  # [shape_count]
-    focus: wp.array[wp.vec3],  # [shape_count]
-    stop_first: wp.array[wp.int32],  # [shape_count + 1]
-    stop_offsets: wp.array[wp.float32],  # [stop_count]
-    stop_colors: wp.array[wp.vec3],  # [stop_count]
-    stop_opacities: wp.array[wp.float32],  # [stop_count]
-    paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] gradients of colour and opacity
-    # Out:
-    frames_grad: wp.array[frame],  # [shape_count] written
-    stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
-    stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
-    stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
-):
-    """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated as
-    a constant. One thread a shape.
-    """
-    shape = offset + wp.tid()
-    if not is_gradient(paint[shape]):
-        return
-    first = stop_first[shape]
-    last = stop_first[shape + 1]
-    if is_columnwise(spread[shape], focus[shape], stop_offsets, first, last):
-        return
-    for i in range(first, last):
-        stop_offsets_grad[i] = 0.0
-        stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
-        stop_opacities_grad[i] = 0.0
-    f = frames[shape]
-    origin = wp.vec2(0.0, 0.0)
-    along = wp.vec2(0.0, 0.0)
-    across = wp.vec2(0.0, 0.0)
-    for slot in range(slot_first[shape], slot_last[shape]):
-        state = slot_state[slot]
-        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
-            for p in range(constants.TILE * constants.TILE):
-                g = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
-                g_opacity = paint_pixels[slot, 3, p]
-                place = to_unit(
-                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
-                )
-                raw = parameter(paint[shape], focus[shape], place)
-                t = spread_out(spread[shape], raw[0])
-                at = between_stops(stop_offsets, first, last, t[0])
-                low_share = 1.0 - at.share
-                stop_colors_grad[at.low] = stop_colors_grad[at.low] + low_share * g
-                stop_colors_grad[at.high] = stop_colors_grad[at.high] + at.share * g
-                stop_opacities_grad[at.low] = stop_opacities_grad[at.low] + low_share * g_opacity
-                stop_opacities_grad[at.high] = stop_opacities_grad[at.high] + at.share * g_opacity
-                if at.width > 0.0:
-                    step = wp.dot(g, stop_colors[at.high] - stop_colors[at.low])
-                    step += g_opacity * (stop_opacities[at.high] - stop_opacities[at.low])
-                    by_t = step / at.width
-                    if at.low_is_own == 1:
-                        stop_offsets_grad[at.low] = stop_offsets_grad[at.low] - low_share * by_t
-                    if at.high_is_own == 1:
-                        stop_offsets_grad[at.high] = stop_offsets_grad[at.high] - at.share * by_t
-                    move = (-by_t * t[1]) * to_unit_adjoint(f, wp.vec2(raw[1], raw[2]))
-                    origin += move
-                    along += place[0] * move
-                    across += place[1] * move
-    frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])

@@ -13,12 +13,11 @@ import warpsplat
 
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
-    """Return those that the module defines, by factories too."""
-    return [
-        value
-        for value in vars(module).values()
-        if isinstance(value, wp.Kernel) and value.func.__module__ == module.__name__
+    """Return those that the module names, alone or in a list."""
+    values = [
+        value for found in vars(module).values() for value in (found if isinstance(found, list) else [found])
     ]
+    return [value for value in values if isinstance(value, wp.Kernel)]
 
 
 def kernel_folders() -> list[Path]:
@@ -38,4 +37,4 @@ def all_kernels() -> list[wp.Kernel]:
         )
     ]
     modules = map(importlib.import_module, sorted(names))
-    return [kernel for module in modules for kernel in kernels_of(module)]
+    return list(dict.fromkeys(kernel for module in modules for kernel in kernels_of(module)))

@@ -13,10 +13,9 @@ import warp as wp
 
 from tests.kernels import trials
 from tests.kernels.modules import kernel_folders
+from warpsplat.kernels import pixels
 
 ANGLES = np.linspace(-20, 20, 4001).astype(np.float32)
-TAILS = (np.linspace(3e-4, 0.7, 500) ** 2).astype(np.float32)
-DEVIATIONS = np.linspace(0, 5.4, 1000).astype(np.float32)
 AGES = np.arange(0, 3000, 7, dtype=np.int32)
 
 LIBRARY_CALLS = {
@@ -75,25 +74,10 @@ def test_whole_powers(device: str) -> None:
     assert np.abs(made / exact - 1).max() < 1e-7
 
 
-def test_the_normal_distribution(device: str) -> None:
-    made = run(trials.normal_tails, DEVIATIONS, device)
-    exact = np.array([0.5 * math.erfc(z / math.sqrt(2)) for z in DEVIATIONS.astype(np.float64)])
-    assert np.abs(made - exact).max() < 2e-7
-    assert np.abs(made / exact - 1).max() < 4e-6
-    assert (np.diff(made) <= 1e-7).all()
-
-
-def test_quantiles_are_the_inverse(device: str) -> None:
-    back = run(trials.normal_tails, run(trials.normal_quantiles, TAILS, device).astype(np.float32), device)
-    assert np.abs(back / TAILS - 1).max() < 1e-5
-
-
 PINNED: dict[str, tuple[Callable[[], np.ndarray], str]] = {
     "sines_and_cosines": (lambda: run(trials.sines_and_cosines, ANGLES, "cpu", wp.vec2), "756791f9eb1f0e79"),
     "angles": (lambda: run(trials.angles_of_directions, ANGLES[2000:2600], "cpu"), "6fad64080bf0ba65"),
     "powers": (lambda: run(trials.powers, AGES, "cpu"), "ba8a9a6b03682436"),
-    "normal_tails": (lambda: run(trials.normal_tails, DEVIATIONS, "cpu"), "37eedcb99077d630"),
-    "normal_quantiles": (lambda: run(trials.normal_quantiles, TAILS, "cpu"), "88120ddf5e997572"),
 }
 
 
@@ -122,3 +106,7 @@ def test_no_kernel_calls_the_c_library() -> None:
     assert len(files) > 20
     found = {path: library_calls(path.read_text(encoding="utf-8")) for path in files}
     assert not {path: calls for path, calls in found.items() if calls}
+
+
+def test_modules_are_installed_under_the_package() -> None:
+    assert pixels.tiles_to_pixels.module.name == "warpsplat.kernels.pixels"

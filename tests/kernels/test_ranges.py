@@ -10,13 +10,9 @@ from tests.helpers import renderer_for
 from tests.scenes import random_scene
 from warpsplat.errors import CapacityError
 from warpsplat.kernels import constants
-from warpsplat.kernels.ranges import bounded_product
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.kernel_cache import load
 from warpsplat.rendering.ranges import record_ranges
 from warpsplat.scene import Kind
-
-wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
 CAPACITY = 100
 
@@ -65,18 +61,3 @@ def test_such_a_scene_is_refused_in_a_line(device: str) -> None:
     with pytest.raises(CapacityError, match=r"needs \d+ samples and over 2 billion tile slots") as caught:
         renderer.grow()
     assert "\n" not in str(caught.value)
-
-
-@wp.kernel
-def products(a: wp.array[wp.int32], b: wp.array[wp.int32], out: wp.array[wp.int32]):  # type: ignore[no-untyped-def]
-    i = wp.tid()
-    out[i] = bounded_product(a[i], b[i])  # type: ignore[index]
-
-
-def test_counts_do_not_wrap(device: str) -> None:
-    pairs = [(3, 4), (2**20, 2**20), (2**31 - 1, 2**31 - 1), (-(2**31), 5), (0, 9)]
-    a, b = (wp.array(np.array(x, np.int32), dtype=wp.int32, device=device) for x in zip(*pairs, strict=True))
-    out = wp.zeros(len(pairs), dtype=wp.int32, device=device)
-    load(products, wp.get_device(device))
-    wp.launch(products, len(pairs), inputs=[a, b, out], device=device)
-    assert out.numpy().tolist() == [12, constants.COUNT_MAX, constants.COUNT_MAX, 0, 0]

@@ -6,7 +6,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.elementary import angle_of, normal_quantile, normal_tail, power, sine_and_cosine
+from warpsplat.kernels.elementary import angle_of, power, sine_and_cosine
 from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
@@ -187,15 +187,3 @@ def angles(x: wp.array[wp.float32], y: wp.array[wp.float32], out: wp.array[wp.fl
 def powers(x: wp.array[wp.int32], out: wp.array[wp.float32]):
     i = wp.tid()
     out[i] = power(0.999, x[i])
-
-
-@wp.kernel
-def normal_tails(x: wp.array[wp.float32], out: wp.array[wp.float32]):
-    i = wp.tid()
-    out[i] = normal_tail(x[i])
-
-
-@wp.kernel
-def normal_quantiles(x: wp.array[wp.float32], out: wp.array[wp.float32]):
-    i = wp.tid()
-    out[i] = normal_quantile(x[i])

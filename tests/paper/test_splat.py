@@ -7,30 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from tests.helpers import (
     SPLAT,
     adjoint,
     compare,
-    coverage_images,
-    relative_error,
     renderer_for,
-    run,
 )
-from tests.paper.helpers import grid_of, plans_of
-from tests.paper.reference import splat as reference
-from tests.paper.reference.grid import grids, runs_of
-from tests.reference.curves import tensors
+from tests.paper.helpers import grid_of
 from tests.scenes import canvas, disc, mixed_scene, random_scene
-from warpsplat.errors import CapacityError
-from warpsplat.kernels.constants import PLATEAU, TILE, TILE_PIXELS
+from warpsplat.kernels.constants import TILE
 from warpsplat.metrics import psnr
-from warpsplat.paper.kernels import splat_coverage
+from warpsplat.paper.constants import PLATEAU
 from warpsplat.paper.models import SplatModel
-from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.renderer import Capacity, Renderer, render
+from warpsplat.paper.split import subcurve
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
@@ -77,51 +69,6 @@ def test_fills_without_two_chains_are_refused(device: str, message: str) -> None
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-def test_coverage_and_adjoint(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, seed=21)
-    renderer = renderer_for(scene, device, model=SPLAT)
-    grid, bins = grid_of(renderer), renderer.bins.buffers
-    coverage = renderer.coverage.buffers
-    height, width = renderer.viewport.height, renderer.viewport.width
-    positions = grids(scene, tensors(scene), plans_of(renderer), 1.0)
-    got = coverage_images(renderer)[:, :height, :width]
-    rng = np.random.default_rng(0)
-    coverage_grad = rng.normal(size=coverage.coverage_pixels.shape).astype(np.float32)
-    # Compositing leaves no gradient in the padding of the tiles.
-    inside = renderer.film.buffers.inside.numpy().reshape(-1, TILE_PIXELS)
-    coverage_grad *= inside[np.minimum(bins.slot_tile.numpy(), len(inside) - 1)]
-    coverage.coverage_pixels.assign(coverage_grad * (1 - coverage.coverage_pixels.numpy()))
-    run(
-        splat_coverage.splat_backward,
-        renderer.capacity.samples,
-        device,
-        bins,
-        grid,
-        sum_grad=coverage.coverage,
-    )
-    tiles = bins.slot_tile.numpy()
-    for shape, places in enumerate(positions):
-        runs = runs_of(scene, shape)
-        mean, scale, angle = (x.detach().requires_grad_() for x in reference.gaussians(places, runs=runs))
-        g = reference.gaussian_values(mean, scale, angle, reference.cuts(places), width, height)
-        cover = 1 - torch.prod(1 - g, 0)
-        np.testing.assert_allclose(got[shape], cover.detach().numpy(), atol=2e-3)
-        assert np.abs(got[shape] - cover.detach().numpy()).mean() < 1e-5
-        total = torch.zeros(())
-        for slot in range(bins.slot_first.numpy()[shape], bins.slot_last.numpy()[shape]):
-            y, x = divmod(int(tiles[slot]), renderer.viewport.tiles_x)
-            block = cover[TILE * y : TILE * (y + 1), TILE * x : TILE * (x + 1)]
-            weights = torch.tensor(coverage_grad[slot].reshape(TILE, TILE).T)[
-                : block.shape[0], : block.shape[1]
-            ]
-            total = total + (block * weights).sum()
-        total.backward()
-        rows = slice(grid.gaussian_first.numpy()[shape], grid.gaussian_last.numpy()[shape])
-        assert mean.grad is not None
-        assert relative_error(grid.mean_grad.numpy()[rows], mean.grad.numpy()) < 2e-3
-
-
-@pytest.mark.parametrize("kind", list(Kind))
 def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
     scene = random_scene(kind, count=12, width=75, height=50, seed=4)
     renderer = renderer_for(scene, device, model=SPLAT)
@@ -141,39 +88,6 @@ def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
             if (high >= [TILE * tx, TILE * ty]).all() and (low < [TILE * (tx + 1), TILE * (ty + 1)]).all():
                 wanted.append(shape)
         assert listed == wanted[::-1]
-
-
-def test_slot_ranges_cover_each_pixel_once(device: str) -> None:
-    renderer = renderer_for(random_scene(FILL, count=9, seed=8), device, model=SPLAT)
-    bins = renderer.bins.buffers
-    used = bins.slot_shape.numpy() >= 0
-    assert used.sum() == renderer.needed_slots.numpy()[0]
-    pairs = set(zip(bins.slot_shape.numpy()[used], bins.slot_tile.numpy()[used], strict=True))
-    assert len(pairs) == used.sum()
-    assert renderer.coverage.buffers.coverage_pixels.shape == (renderer.capacity.slots, TILE_PIXELS)
-
-
-def test_overflow_is_counted_and_mended(device: str) -> None:
-    scene = random_scene(FILL, count=10)
-    whole = splatted(scene, device)
-    parameters = Parameters(scene, Backend.on(device))
-    viewport = Viewport(scene.canvas.width, scene.canvas.height)
-    small = Renderer(parameters, viewport, model=SPLAT, capacity=Capacity(700, 9))
-    small.forward()
-    assert np.isfinite(small.read_image()).all()
-    assert small.needed_samples.numpy()[0] > 700
-    assert small.grow()
-    small.forward()
-    assert small.grow() or small.capacity.slots >= small.needed_slots.numpy()[0]
-    small.forward_complete()
-    assert not small.grow()
-    np.testing.assert_array_equal(small.read_image(), whole)
-
-
-def test_a_scene_past_the_limits_is_refused(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.rendering.renderer.SLOT_LIMIT", 3)
-    with pytest.raises(CapacityError, match="fewer shapes or a smaller image"):
-        renderer_for(random_scene(FILL), device, model=SPLAT)
 
 
 @pytest.mark.parametrize("radius", [4.0, 10.0, 25.0])
@@ -220,29 +134,11 @@ def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
     assert not any(g.any() for g in adjoint(renderer).values())
 
 
-def test_translation_moves_the_image(device: str) -> None:
-    scene = random_scene(FILL, count=3, width=64, height=64, seed=9)
-    inner = replace(scene, points=(0.4 * scene.points + 12).astype(np.float32))
-    moved = replace(inner, points=inner.points + np.float32(16))
-    a, b = splatted(inner, device), splatted(moved, device)
-    np.testing.assert_allclose(b[16:, 16:], a[:-16, :-16], atol=3e-3)
-
-
 @pytest.mark.parametrize("cuts", [(0.5,), (0.1, 0.15, 0.9), (0.01, 0.02, 0.03, 0.04), (0.2, 0.4, 0.6, 0.8)])
 def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tuple[float, ...]) -> None:
     """One cubic cut into several, of equal and of unequal lengths."""
     whole = np.array([[8, 50], [20, -10], [44, 80], [56, 10]], np.float64)
-
-    def piece(a: float, b: float) -> np.ndarray:
-        return np.array([blossom(*at) for at in ((a, a, a), (a, a, b), (a, b, b), (b, b, b))])
-
-    def blossom(*at: float) -> np.ndarray:
-        p = whole
-        for t in at:
-            p = (1 - t) * p[:-1] + t * p[1:]
-        return p[0]
-
-    pieces = [piece(a, b) for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
+    pieces = [subcurve(whole[None], a, b)[0] for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
     chain = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
     pictures = []
     for points in (whole, chain):

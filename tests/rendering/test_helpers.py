@@ -75,14 +75,6 @@ def test_helpers_that_come_too_late_are_not_waited_for(monkeypatch: pytest.Monke
     assert done == 2 * [0, 1, 2, 3, 4], "the arrays may be gone by now"
 
 
-def test_what_is_withdrawn_is_not_begun() -> None:
-    done: list[int] = []
-    request = helpers.LaunchRequest(lambda: done.append(1))
-    request.settle()
-    request.serve()
-    assert not done
-
-
 def test_what_has_begun_is_waited_for() -> None:
     begun, may_end, done = threading.Event(), threading.Event(), []
 

@@ -113,29 +113,3 @@ def test_on_any_background_it_is_the_opaque_picture(device: str) -> None:
     assert scene.canvas.background is not None
     on = clear[..., :3] + (1 - clear[..., 3:]) * scene.canvas.background
     np.testing.assert_allclose(on, opaque, atol=1e-5)
-
-
-@pytest.mark.parametrize("opaque", [True, False])
-def test_removal_costs(device: str, opaque: bool) -> None:
-    """Measured by taking shapes away; of a transparent canvas on black and on white."""
-    scene = with_gradients(random_scene(Kind.FILL, 4, seed=8), seed=9)
-    scene = scene if opaque else transparent(scene)
-    renderer = renderer_for(scene, device)
-    target = np.random.default_rng(0).uniform(0, 1, renderer.read_image().shape).astype(np.float32)
-    aim = type(renderer.film.buffers.image)
-
-    def error(image: np.ndarray) -> float:
-        difference = (image - target).astype(np.float64)
-        if opaque:
-            return float((difference**2).mean())
-        black, white = difference[..., :3], difference[..., :3] - difference[..., 3:]
-        return float((black**2).mean() + (white**2).mean()) / 2
-
-    from warpsplat.kernels.tile import column
-    from warpsplat.rendering.tiles import to_tiles
-
-    costs = renderer.removal_costs(aim(to_tiles(target), dtype=column, device=device))
-    for i in range(len(scene)):
-        without = scene.take(np.delete(np.arange(len(scene)), i))
-        grown = error(renderer_for(without, device).read_image()) - error(renderer.read_image())
-        assert costs[i] == pytest.approx(grown, rel=1e-3, abs=1e-6)

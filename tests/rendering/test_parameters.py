@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import mixed_scene, point_count, random_scene
+from tests.scenes import mixed_scene, random_scene
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
@@ -46,23 +46,6 @@ def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scen
             np.testing.assert_array_equal(moment.numpy()[: len(rows)], old[rows])
             assert not moment.numpy()[len(rows) :].any()
     assert parameters.revision == 1
-
-
-def test_layout(device: str) -> None:
-    """Check the indices by which kernels find a shape's points and Béziers."""
-    scene = mixed_scene()
-    parameters = Parameters(scene, Backend.on(device))
-    arrays = {name: array.numpy() for name, array in parameters.arrays.items()}
-    for shape in range(len(scene)):
-        own = np.flatnonzero(arrays["point_shape"] == shape)
-        np.testing.assert_array_equal(own, np.arange(*arrays["point_first"][shape : shape + 2]))
-        beziers = np.flatnonzero(arrays["bezier_contour"] == shape)
-        np.testing.assert_array_equal(beziers, np.arange(*arrays["bezier_first"][shape : shape + 2]))
-        kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
-        assert (arrays["kind"][shape], arrays["basis"][shape]) == (kind, basis)
-        assert len(own) == point_count(kind, basis, len(beziers))
-    assert parameters.bezier_count == len(arrays["bezier_contour"])
-    assert parameters.kinds == {Kind.FILL, Kind.STROKE}
 
 
 def test_fewer_points_keep_their_moments(device: str) -> None:
@@ -113,10 +96,3 @@ def test_assigned_values_leave_all_else_as_it_is(device: str) -> None:
     assert parameters.groups["points"].value.ptr == address
     assert (parameters.groups["points"].moment1.numpy() == 2).all()
     assert parameters.revision == 0
-
-
-def test_kernels_and_optimiser_share_memory(device: str) -> None:
-    parameters = Parameters(mixed_scene(), Backend.on(device))
-    for name, group in parameters.groups.items():
-        assert parameters.arrays[name].ptr == group.value.ptr
-        assert parameters.arrays[f"{name}_grad"].ptr == group.grad.ptr

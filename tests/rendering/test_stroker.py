@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
-from tests.helpers import adjoint, compare, pieces_of, renderer_for
+from tests.helpers import compare
 from tests.scenes import DASHES, polyline_scene, random_scene, styled_scene
 from warpsplat.errors import CapacityError
 from warpsplat.metrics import psnr
@@ -19,6 +18,7 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import Cap, Join, Kind, Scene
 from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
 
 STYLES = [(cap, join) for cap in Cap for join in Join if (cap, join) != (Cap.ROUND, Join.ROUND)]
 DASHED = [
@@ -54,72 +54,6 @@ def test_all_styles(device: str, cap: Cap, join: Join, dash: int) -> None:
     compare(styled_scene(cap, join, dash, seed=6), device, 1.3, lanes=lanes)
 
 
-@pytest.mark.usual_seed  # in a place where the image does not jump
-@pytest.mark.parametrize(
-    ("cap", "join", "dash"),
-    [(Cap.SQUARE, Join.MITER, NO_DASHES), (Cap.BUTT, Join.BEVEL, 1), (Cap.ROUND, Join.ROUND, 1)],
-)
-def test_finite_differences(device: str, cap: Cap, join: Join, dash: int) -> None:
-    """No reference at all: random directions in the points and widths of a shape, central differences.
-
-    Where curves get other numbers of pieces the image jumps; and it may where a dash's end passes a vertex,
-    which few directions meet.
-    """
-    scene = styled_scene(cap, join, dash, seed=8).take(np.arange(1))
-    rng = np.random.default_rng(0)
-    weights = cv2.GaussianBlur(rng.normal(size=(36, 40, 3)), (0, 0), 2.0)
-    renderer = renderer_for(scene, device)
-    gradients = adjoint(renderer, weights)
-    step = 0.002
-    for name in ("points", "widths"):
-        value, errors = getattr(scene, name), []
-        for _ in range(14):
-            direction = rng.normal(size=value.shape)
-            moved = [
-                renderer_for(replace(scene, **{name: (value + s * direction).astype(np.float32)}), device)
-                for s in (step, -step)
-            ]
-            if all(pieces_of(one) == pieces_of(renderer) for one in moved):
-                ahead, back = ((one.read_image().astype(np.float64) * weights).sum() for one in moved)
-                products = gradients[name] * direction
-                errors.append(abs((ahead - back) / (2 * step) - products.sum()) / np.abs(products).sum())
-        assert len(errors) > 2
-        assert np.median(errors) < 0.003, name
-
-
-WORDS: dict[str, dict[int, str]] = {
-    "stroke-linecap": {Cap.ROUND: "round", Cap.BUTT: "butt", Cap.SQUARE: "square"},
-    "stroke-linejoin": {Join.ROUND: "round", Join.MITER: "miter", Join.BEVEL: "bevel"},
-}
-
-
-def as_svg(scene: Scene) -> str:
-    """Straight white strokes on black."""
-    paths = []
-    for i in range(len(scene)):
-        contours = [
-            "M" + "L".join(f"{x:.9g} {y:.9g}" for x, y in points[::3]) + "z" * closed
-            for points, closed in scene.contours_of(i)
-        ]
-        style = {
-            "d": "".join(contours),
-            "stroke-width": f"{scene.widths[i]:.9g}",
-            "stroke-linecap": WORDS["stroke-linecap"][Cap(int(scene.cap[i]))],
-            "stroke-linejoin": WORDS["stroke-linejoin"][Join(int(scene.join[i]))],
-            "stroke-miterlimit": f"{scene.miter_limits[i]:.9g}",
-        }
-        if scene.dash[i] != NO_DASHES:
-            offset, *pattern = scene.dashes[scene.dash[i]]
-            style |= {"stroke-dashoffset": f"{offset}", "stroke-dasharray": " ".join(map(str, pattern))}
-        words = " ".join(f'{name}="{value}"' for name, value in style.items())
-        paths.append(f"<path {words}/>")
-    size = f'width="{scene.canvas.width}" height="{scene.canvas.height}"'
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size}><rect {size}/>'
-        f'<g fill="none" stroke="#fff">{"".join(paths)}</g></svg>'
-    )
-
-
 ZIGZAG = [(8, 10), (40, 13), (15, 28), (50, 33), (45, 54), (12, 50)]
 TRIANGLE = [(10, 14), (54, 18), (30, 54)]
 
@@ -129,7 +63,7 @@ def check_against_viewer(scene: Scene, device: str, least: float) -> None:
     this size hardly further than that is from the large one.
     """
     mine = 255 * render(scene, backend=Backend.on(device)).astype(np.float64)
-    text, size = as_svg(scene), (scene.canvas.width, scene.canvas.height)
+    text, size = write_svg(scene), (scene.canvas.width, scene.canvas.height)
     viewer = on_white(render_svg(text))
     truth = cv2.resize(on_white(render_svg(text, zoom=8)), size, interpolation=cv2.INTER_AREA)
     assert psnr(mine, truth) > least

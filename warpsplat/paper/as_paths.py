@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.kernels import constants
+from warpsplat.paper import constants as paper
 from warpsplat.portable import elementary
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray, Kind, Scene
@@ -36,16 +36,16 @@ LEVELS = np.linspace(0, 1, 201)
 
 def _row_profile(opacity: Floats, distance: Floats) -> Floats:
     """Return coverages at distances [standard deviations] from a row of Gaussians: (opacity, distance)."""
-    along = np.arange(-REACH, REACH + 1) / constants.SPREAD
+    along = np.arange(-REACH, REACH + 1) / paper.SPREAD
     g = elementary.exp(-0.5 * (along[:, None] ** 2 + distance**2))
-    return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None, None] * g, axis=1))
+    return np.asarray(1 - np.prod(1 - paper.GAUSSIAN_MAX * opacity[:, None, None] * g, axis=1))
 
 
 def _plateau(opacity: Floats) -> Floats:
     """Return the coverage well inside a grid of Gaussians."""
-    along = np.arange(-REACH, REACH + 1) / constants.SPREAD
+    along = np.arange(-REACH, REACH + 1) / paper.SPREAD
     g = elementary.exp(-0.5 * (along[:, None] ** 2 + along**2)).ravel()
-    return np.asarray(1 - np.prod(1 - constants.GAUSSIAN_MAX * opacity[:, None] * g, axis=1))
+    return np.asarray(1 - np.prod(1 - paper.GAUSSIAN_MAX * opacity[:, None] * g, axis=1))
 
 
 def _outlines(scene: Scene) -> FloatArray:
@@ -74,7 +74,7 @@ def as_paths(scene: Scene, softness: float) -> Scene:
     breadth = mass**2 / np.maximum(energy, 1e-12) * (distance[1] - distance[0])
     breadth[0] = breadth[1]
     opacity = np.clip(scene.opacities[:, None] + scene.fades, 0, 1)
-    sigma = elementary.hypot(constants.WIDTH_SIGMA * scene.widths, softness)
+    sigma = elementary.hypot(paper.WIDTH_SIGMA * scene.widths, softness)
     stroke = scene.kind == Kind.STROKE
     shown = np.where(
         stroke,

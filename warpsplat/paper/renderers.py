@@ -9,7 +9,7 @@ import numpy as np
 from warpsplat.errors import UsageError
 from warpsplat.fit.renderers import FitRenderer
 from warpsplat.fit.settings import Settings
-from warpsplat.kernels import constants
+from warpsplat.paper import constants as paper
 from warpsplat.paper.as_paths import as_paths
 from warpsplat.paper.chains import as_chains
 from warpsplat.paper.models import GaussianModel, SplatModel
@@ -32,7 +32,7 @@ class Splat(FitRenderer):
     """Gaussians that cover what a path covers."""
 
     exact = False
-    opacity_scale = constants.PLATEAU
+    opacity_scale = paper.PLATEAU
     default_model: Model = SplatModel()
 
     def preset(self, preset: Settings) -> Settings:

@@ -32,7 +32,7 @@ def split(scene: Scene, index: IndexArray) -> Scene:
     strokes = np.repeat(np.asarray(index, np.intp), 2)
     ends = np.tile([0, STROKE_POINTS - 4], len(index))
     first = (scene.first[strokes] + ends)[:, None] + np.arange(4)
-    thirds = [_subcurve(scene.points[first], k / 3, (k + 1) / 3) for k in range(3)]
+    thirds = [subcurve(scene.points[first], k / 3, (k + 1) / 3) for k in range(3)]
     return Scene.uniform(
         Kind.STROKE,
         scene.canvas,
@@ -43,7 +43,7 @@ def split(scene: Scene, index: IndexArray) -> Scene:
     )
 
 
-def _subcurve(cubics: npt.NDArray[np.floating], a: float, b: float) -> npt.NDArray[np.floating]:
+def subcurve(cubics: npt.NDArray[np.floating], a: float, b: float) -> npt.NDArray[np.floating]:
     """Return the part of cubics [n, 4, 2] between the parameters ``a`` and ``b``, by their blossoms."""
 
     def blossom(*at: float) -> npt.NDArray[np.floating]:

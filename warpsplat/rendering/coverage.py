@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import warp as wp
 
@@ -27,23 +27,6 @@ class CoverageBuffers:
     coverage_pixels: wp.array = buffer(wp.float32, "slots", constants.TILE_PIXELS, memory_of="coverage")
 
 
-@dataclass
-class FillBuffers:
-    """Further arrays for fills."""
-
-    slot_winding: wp.array = buffer(wp.int32, "slots")
-    """Winding number of slots that no edge touches."""
-
-
-@dataclass
-class StrokeBuffers:
-    """Further arrays for strokes."""
-
-    slot_near: wp.array = buffer(wp.int32, "slots", "lanes")
-    segment: wp.array = buffer(wp.int32, "slots", constants.TILE_PIXELS)
-    """Nearest segment of each pixel."""
-
-
 class Coverage(Protocol):
     """Interface of a coverage model."""
 
@@ -61,157 +44,75 @@ class Coverage(Protocol):
         """Record gradients in the coverages' place -> gradients of the samples."""
 
 
-@dataclass(frozen=True)
-class ExactStages:
-    """Stages that the parts of exact coverage read and write."""
+@dataclass
+class ExactBuffers(CoverageBuffers):
+    """Further arrays for fills and for strokes."""
 
-    inputs: StageInputs
-    outline: Outline
-    coverage: CoverageBuffers
-
-    @property
-    def sources(self) -> tuple[object, ...]:
-        """Return the objects in which launches find their arrays."""
-        i = self.inputs
-        return self.coverage, i.bins.buffers, self.outline.buffers, i.parameters.arrays, i.viewport
-
-
-class FillCoverage:
-    """Fills by signed area: states first, then coverages of what is seen."""
-
-    part = constants.FILL
-
-    def __init__(self, stages: ExactStages) -> None:
-        self._stages = stages
-        self.buffers = stages.inputs.backend.allocate(FillBuffers, {"slots": stages.inputs.slots})
-        self._sources = (*stages.sources, self.buffers)
-        self._edges = stages.outline.buffers.vertex.shape[0]
-
-    def states(self, program: Program) -> None:
-        """See ``Coverage``."""
-        program.launch(
-            fill.fill_states, self._stages.inputs.slots, *self._sources, own_part=self.part, split=True
-        )
-
-    def values(self, program: Program) -> None:
-        """See ``Coverage``."""
-        backend = self._stages.inputs.backend
-        program.launch(
-            fill.fill_forward,
-            (self._stages.inputs.slots, backend.lanes),
-            *self._sources,
-            own_part=self.part,
-            lane_rows=backend.lane_size,
-            split=True,
-        )
-
-    def backward(self, program: Program) -> None:
-        """Record gradients in the coverages' place -> gradients of the edges' ends."""
-        program.launch(
-            fill.fill_backward,
-            self._edges,
-            *self._sources,
-            own_part=self.part,
-            sum_grad=self._stages.coverage.coverage_pixels,
-            split=True,
-        )
-
-
-class StyledCoverage(FillCoverage):
-    """Strokes as polygons, whose union is filled."""
-
-    part = constants.STYLED
-
-    def __init__(self, stages: ExactStages) -> None:
-        super().__init__(stages)
-        stroker = stages.outline.stroker
-        assert stroker
-        self._stroker = stroker
-        nonzero = stages.inputs.backend.array(wp.int32, stages.inputs.parameters.shape_count)
-        shapes = stages.inputs.parameters.arrays | {"rule": nonzero}
-        self._sources = (
-            stages.coverage,
-            stages.inputs.bins.buffers,
-            stroker.edges(),
-            shapes,
-            stages.inputs.viewport,
-            self.buffers,
-        )
-
-    def backward(self, program: Program) -> None:
-        """Record gradients in the coverages' place -> gradients of the centre lines and of the widths."""
-        super().backward(program)
-        self._stroker.backward(program)
-
-
-class StrokeCoverage:
-    """Round strokes by distance: states and coverages in one go."""
-
-    def __init__(self, stages: ExactStages) -> None:
-        self._stages = stages
-        sizes = {"slots": stages.inputs.slots, "lanes": stages.inputs.backend.lanes}
-        self.buffers = stages.inputs.backend.allocate(StrokeBuffers, sizes)
-
-    def states(self, program: Program) -> None:
-        """See ``Coverage``."""
-        backend = self._stages.inputs.backend
-        program.launch(
-            stroke.stroke_forward,
-            (self._stages.inputs.slots, backend.lanes),
-            *self._stages.sources,
-            self.buffers,
-            lane_rows=backend.lane_size,
-            split=True,
-        )
-
-    def values(self, program: Program) -> None:
-        """Do nothing: all values are there."""
-
-    def backward(self, program: Program) -> None:
-        """Record gradients in the coverages' place -> gradients of the segments' ends and of the widths."""
-        stages = self._stages
-        program.launch(
-            stroke.stroke_backward,
-            stages.outline.buffers.vertex.shape[0],
-            *stages.sources,
-            self.buffers,
-            sum_grad=stages.coverage.coverage_pixels,
-            split=True,
-        )
-        program.launch(stroke.widths_backward, stages.inputs.parameters.shape_count, *stages.sources)
-
-
-EXACT_PARTS: dict[int, type[FillCoverage] | type[StrokeCoverage]] = {
-    constants.FILL: FillCoverage,
-    constants.STROKE: StrokeCoverage,
-    constants.STYLED: StyledCoverage,
-}
-"""Coverage of the shapes of each of ``Parameters.parts``."""
+    slot_winding: wp.array = buffer(wp.int32, "fill_slots")
+    """Winding number of slots that no edge touches."""
+    slot_near: wp.array = buffer(wp.int32, "stroke_slots", "lanes")
+    segment: wp.array = buffer(wp.int32, "stroke_slots", constants.TILE_PIXELS)
+    """Nearest segment of each pixel."""
 
 
 class ExactCoverage:
-    """The area that a viewer computes, from polylines: a part for each kind of shape in the scene."""
+    """The area that a viewer computes, from polylines.
+
+    Fills, and styled strokes as polygons, by signed area: states first, then coverages of what is seen. Round
+    strokes by distance: states and coverages in one go.
+    """
 
     mapping = constants.AREA
 
     def __init__(self, inputs: StageInputs, outline: Outline) -> None:
-        self.buffers = inputs.backend.allocate(CoverageBuffers, {"slots": inputs.slots})
-        self._outline = outline
-        stages = ExactStages(inputs, outline, self.buffers)
-        self.parts = [EXACT_PARTS[part](stages) for part in inputs.parameters.parts]
+        self._inputs, self._outline = inputs, outline
+        self._parts = inputs.parameters.parts
+        slots, lanes = inputs.slots, inputs.backend.lanes
+        sizes = {"slots": slots, "lanes": lanes, "fill_slots": slots, "stroke_slots": 0}
+        if constants.STROKE in self._parts:
+            sizes["stroke_slots"] = slots
+        self.buffers: CoverageBuffers = inputs.backend.allocate(ExactBuffers, sizes)
+        arrays = inputs.parameters.arrays
+        self._edges: dict[int, tuple[object, ...]] = dict.fromkeys(self._parts, (outline.buffers, arrays))
+        if outline.stroker:
+            nonzero = inputs.backend.array(wp.int32, inputs.parameters.shape_count)
+            self._edges[constants.STYLED] = (outline.stroker.edges(), arrays | {"rule": nonzero})
+
+    def _launch(
+        self, program: Program, part: int, kernel: wp.Kernel, dim: int | tuple[int, int], **values: Any
+    ) -> None:
+        sources = (self.buffers, self._inputs.bins.buffers, self._inputs.viewport, *self._edges[part])
+        program.launch(kernel, dim, *sources, split=True, **values)
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
-        for part in self.parts:
-            part.states(program)
+        slots, backend = self._inputs.slots, self._inputs.backend
+        for part in self._parts:
+            if part == constants.STROKE:
+                dim = slots, backend.lanes
+                self._launch(program, part, stroke.stroke_forward, dim, lane_rows=backend.lane_size)
+            else:
+                self._launch(program, part, fill.fill_states, slots, own_part=part)
 
     def values(self, program: Program) -> None:
         """See ``Coverage``."""
-        for part in self.parts:
-            part.values(program)
+        backend = self._inputs.backend
+        for part in self._parts:
+            if part != constants.STROKE:
+                dim, rows = (self._inputs.slots, backend.lanes), backend.lane_size
+                self._launch(program, part, fill.fill_forward, dim, own_part=part, lane_rows=rows)
 
     def backward(self, program: Program) -> None:
-        """Record gradients in the coverages' place -> gradients of the points."""
-        for part in self.parts:
-            part.backward(program)
+        """Record gradients in the coverages' place -> gradients of the points and widths."""
+        edges, gradient = self._inputs.samples, self.buffers.coverage_pixels
+        arrays = self._inputs.parameters.arrays
+        for part in self._parts:
+            if part == constants.STROKE:
+                self._launch(program, part, stroke.stroke_backward, edges, sum_grad=gradient)
+                shapes, lines = self._inputs.parameters.shape_count, self._outline.buffers
+                program.launch(stroke.widths_backward, shapes, arrays, lines, self._inputs.viewport)
+            else:
+                self._launch(program, part, fill.fill_backward, edges, own_part=part, sum_grad=gradient)
+        if self._outline.stroker:
+            self._outline.stroker.backward(program)
         self._outline.backward(program)

@@ -64,60 +64,36 @@ class Film:
         whole = np.ones((viewport.height, viewport.width, 1), np.float32)
         self.buffers.inside.assign(to_tiles(whole)[:, 0])
 
-    def _kernels(self, paint: Painting) -> tuple[wp.Kernel, wp.Kernel]:
+    def attach(self, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+        """Composite the shapes of these stages from now on."""
+        self._bins, self._coverage, self._paint = bins, coverage, paint
+
+    def _kernels(self) -> tuple[wp.Kernel, wp.Kernel]:
         """Return the forward pass and its adjoint: those of flat paints on a background where that is all."""
         if self._straight:
             return composite.straight_forward, composite_opaque.straight_backward
-        if self.planes == 3 and paint.is_flat:
+        if self.planes == 3 and self._paint.is_flat:
             usual, opaque = composite_backward.composite_backward, composite_opaque.opaque_backward
             return composite.composite_forward, opaque if self._opaque else usual
         usual, opaque = composite_backward.paint_backward, composite_opaque.opaque_paint_backward
         return composite.paint_forward, opaque if self._opaque else usual
 
-    def _launch(
-        self,
-        program: Program,
-        kernel: wp.Kernel,
-        bins: Bins,
-        coverage: Coverage,
-        paint: Painting,
-        **values: Any,
-    ) -> None:
+    def launch(self, program: Program, kernel: wp.Kernel, **values: Any) -> None:
         """Record a kernel that goes through each tile's list."""
         dim = (self._viewport.tile_count, self._backend.lanes)
         numbers = {"lane_columns": self._backend.lane_size, "background": self._background}
-        sources = (self.buffers, bins.buffers, coverage.buffers, paint.buffers, numbers, values)
-        program.launch(kernel, dim, *sources, split=True)
+        stages = (self._bins.buffers, self._coverage.buffers, self._paint.buffers)
+        program.launch(kernel, dim, self.buffers, *stages, numbers, values, split=True)
 
-    def forward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+    def forward(self, program: Program) -> None:
         """Record lists and coverages -> ``image``."""
-        self._launch(program, self._kernels(paint)[0], bins, coverage, paint)
+        self.launch(program, self._kernels()[0])
 
-    def backward(self, program: Program, bins: Bins, coverage: Coverage, paint: Painting) -> None:
+    def backward(self, program: Program) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
+        coverage = self._coverage
         values: dict[str, Any] = {"mapping": coverage.mapping, "sum_grad": coverage.buffers.coverage}
         if self._opaque:
-            slots = bins.buffers.list_slot.shape[0]
+            slots = self._bins.buffers.list_slot.shape[0]
             values["transmittances"] = self._backend.array(column, slots, self._backend.lanes)
-        self._launch(program, self._kernels(paint)[1], bins, coverage, paint, **values)
-
-    def removal_cost(
-        self,
-        program: Program,
-        bins: Bins,
-        coverage: Coverage,
-        paint: Painting,
-        target: wp.array,
-        importance: wp.array | None,
-        slot_cost: wp.array,
-    ) -> None:
-        """Record by how much the squared error against ``target`` would grow without each slot."""
-        importance = self.buffers.inside if importance is None else importance
-        values = {"target": target, "importance": importance, "slot_cost": slot_cost}
-        self._launch(program, composite.removal_cost, bins, coverage, paint, **values)
-
-    def visibility(
-        self, program: Program, bins: Bins, coverage: Coverage, paint: Painting, seen: wp.array
-    ) -> None:
-        """Record how much each pixel of a slot shows of its shape."""
-        self._launch(program, composite.visibility, bins, coverage, paint, seen=seen)
+        self.launch(program, self._kernels()[1], **values)

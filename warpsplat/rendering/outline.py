@@ -47,16 +47,11 @@ class Outline:
     def __init__(self, inputs: StageInputs, *, slack: float = 1.0) -> None:
         """``slack``: how much further from the curves the polylines may be than ``constants.FLATNESS``."""
         parameters = inputs.parameters
-        self._parameters, self._viewport = parameters, inputs.viewport
+        self._parameters = parameters
         self._capacity, self._needed, self._slack = inputs.samples, inputs.needed, slack
-        self.buffers = inputs.backend.allocate(
-            OutlineBuffers,
-            {
-                "beziers": parameters.bezier_count,
-                "shapes": parameters.shape_count,
-                "vertices": inputs.samples,
-            },
-        )
+        sizes = {"beziers": parameters.bezier_count, "shapes": parameters.shape_count}
+        self.buffers = inputs.backend.allocate(OutlineBuffers, sizes | {"vertices": inputs.samples})
+        self._sources = (self.buffers, parameters.arrays, inputs.viewport)
         self.stroker = Stroker(inputs, self.buffers) if constants.STYLED in parameters.parts else None
         """Stage of the strokes that are drawn as polygons."""
 
@@ -73,21 +68,14 @@ class Outline:
     def forward(self, program: Program) -> None:
         """Record points, widths -> vertices."""
         b, p = self.buffers, self._parameters
-        sources = (b, p.arrays, self._viewport)
-        program.launch(outline.plan_outline, p.shape_count, *sources, slack=self._slack)
+        program.launch(outline.plan_outline, p.shape_count, *self._sources, slack=self._slack)
         ranges = (b.vertex_count, b.vertex_ends, b.vertex_first, b.vertex_last)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity)
-        program.launch(outline.outline_forward, p.bezier_count, *sources, split=True)
+        program.launch(outline.outline_forward, p.bezier_count, *self._sources, split=True)
         if self.stroker:
             self.stroker.forward(program)
 
     def backward(self, program: Program) -> None:
         """Record gradients of the edges' ends -> gradients of the points."""
-        program.launch(
-            outline.outline_backward,
-            self._parameters.point_count,
-            self.buffers,
-            self._parameters.arrays,
-            self._viewport,
-            split=True,
-        )
+        points = self._parameters.point_count
+        program.launch(outline.outline_backward, points, *self._sources, split=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient, padded, picture
+from warpsplat.kernels.paint import flat, gradient_kernels, picture
+from warpsplat.kernels.paint.gradient import Gradients
 from warpsplat.kernels.tile import column
-from warpsplat.rendering.backend import Backend, Viewport, buffer
-from warpsplat.rendering.bins import Bins
-from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.pictures import picture_arrays
 from warpsplat.rendering.program import Program
 from warpsplat.scene import GRADIENTS, Paint
@@ -39,34 +39,37 @@ class PaintBuffers:
 class Painting:
     """Flat colours, gradients and pictures."""
 
-    def __init__(
-        self, backend: Backend, parameters: Parameters, viewport: Viewport, bins: Bins, slots: int
-    ) -> None:
-        self._backend, self._parameters, self._viewport, self._bins = backend, parameters, viewport, bins
-        self._slots = slots
+    def __init__(self, inputs: StageInputs) -> None:
+        self._backend, self._slots = inputs.backend, inputs.slots
+        parameters = inputs.parameters
+        self._shape_count = parameters.shape_count
         self.has_gradients = bool(parameters.paints & set(GRADIENTS))
         self._pictures = (
-            picture_arrays(parameters.pictures, viewport, backend.device)
+            picture_arrays(parameters.pictures, inputs.viewport, self._backend.device)
             if Paint.PICTURE in parameters.paints
             else None
         )
         self.is_flat = not (self.has_gradients or self._pictures)
-        whole = backend.lanes == 1
-        self.buffers = backend.allocate(
+        slots, lanes = self._slots, self._backend.lanes
+        self.buffers = self._backend.allocate(
             PaintBuffers,
             {
-                "column_slots": slots if whole else 1,
-                "lane_slots": 1 if whole else slots,
-                "lanes": backend.lanes,
+                "column_slots": slots if lanes == 1 else 1,
+                "lane_slots": 1 if lanes == 1 else slots,
+                "lanes": lanes,
                 "paint_slots": 1 if self.is_flat else slots,
             },
         )
+        self._gradients = Gradients()
+        for name in Gradients.vars:  # type: ignore[attr-defined]  # of Warp's struct
+            setattr(self._gradients, name, parameters.arrays[name])
+        self._sources = (self.buffers, inputs.bins.buffers, parameters.arrays, inputs.viewport)
 
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         kernels = []
         if self.has_gradients:
-            kernels += [padded.ramp_forward, padded.chain_forward, gradient.gradient_forward]
+            kernels += gradient_kernels.FORWARD
         if self._pictures:
             kernels.append(picture.picture_forward)
         for kernel in kernels:
@@ -75,26 +78,15 @@ class Painting:
                 (self._slots, self._backend.lanes),
                 *self._sources,
                 self._pictures or {},
+                {"g": self._gradients},
                 lane_columns=self._backend.lane_size,
                 split=True,
             )
 
-    @property
-    def _sources(self) -> tuple[object, ...]:
-        return self.buffers, self._bins.buffers, self._parameters.arrays, self._viewport
-
     def backward(self, program: Program) -> None:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
+        shapes = self._shape_count
         if self.has_gradients:
-            shapes = self._parameters.shape_count
-            for kernel in (padded.ramp_backward, padded.chain_backward, gradient.gradient_backward):
-                program.launch(kernel, shapes, *self._sources, split=True)
-        program.launch(
-            flat.flat_backward,
-            self._parameters.shape_count,
-            self.buffers,
-            self._bins.buffers,
-            self._parameters.arrays,
-            lanes=self._backend.lanes,
-            split=True,
-        )
+            for kernel in gradient_kernels.BACKWARD:
+                program.launch(kernel, shapes, *self._sources, g=self._gradients, split=True)
+        program.launch(flat.flat_backward, shapes, *self._sources, lanes=self._backend.lanes, split=True)

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.errors import CapacityError
-from warpsplat.kernels import constants
+from warpsplat.kernels import composite, constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins, StageInputs
@@ -109,7 +109,8 @@ class Renderer:
         self.bins = Bins(backend, p, v, capacity.slots, self.needed_slots, opacity_limit=limit)
         inputs = StageInputs(backend, p, v, self.bins, capacity.samples, capacity.slots, self.needed_samples)
         self.geometry, self.coverage = self.model.stages(inputs)
-        self.paint = Painting(backend, p, v, self.bins, capacity.slots)
+        self.paint = Painting(inputs)
+        self.film.attach(self.bins, self.coverage, self.paint)
         self.forward_program = backend.program()
         self._record_forward(self.forward_program)
         self._backward_program: Program | None = None
@@ -134,7 +135,7 @@ class Renderer:
         self.bins.list_visible(program)  # states, paint -> each tile's list
         self.coverage.values(program)  # lists, samples -> coverages
         self.paint.forward(program)  # frames, stops -> colours of pixels, where there are gradients
-        self.film.forward(program, self.bins, self.coverage, self.paint)  # -> image
+        self.film.forward(program)  # -> image
 
     @property
     def backward_program(self) -> Program:
@@ -145,7 +146,7 @@ class Renderer:
         return self._backward_program
 
     def _record_backward(self, program: Program) -> None:
-        self.film.backward(program, self.bins, self.coverage, self.paint)  # image_grad -> by slot
+        self.film.backward(program)  # image_grad -> by slot
         self.paint.backward(program)  # -> colours, opacities
         self.coverage.backward(program)  # -> samples -> points, widths
 
@@ -182,7 +183,9 @@ class Renderer:
         """
         cost = self.backend.array(wp.float32, self.capacity.slots, self.backend.lanes)
         program = self.backend.program()
-        self.film.removal_cost(program, self.bins, self.coverage, self.paint, target, importance, cost)
+        importance = self.film.buffers.inside if importance is None else importance
+        values = {"target": target, "importance": importance, "slot_cost": cost}
+        self.film.launch(program, composite.removal_cost, **values)
         program.run()
         shapes = self.bins.buffers.slot_shape.numpy()
         used = shapes >= 0
@@ -199,7 +202,7 @@ class Renderer:
         """
         seen = self.backend.array(column, self.capacity.slots, constants.TILE)
         program = self.backend.program()
-        self.film.visibility(program, self.bins, self.coverage, self.paint, seen)
+        self.film.launch(program, composite.visibility, seen=seen)
         program.run()
         shapes, shares = self.bins.buffers.slot_shape.numpy(), seen.numpy()
         rows = np.flatnonzero((shapes >= 0) & shares.any(axis=(1, 2)))

@@ -230,7 +230,8 @@ def write_svg(
         scene: What to write.
         per_pixel: Units of the view box to a pixel. Coordinates are whole units, those of splines even ones.
         metadata: Text behind the program's name in the comment that marks the file.
-        opacity_scale: Factor on opacities: a splat's plateau is a little below 1 (``constants.PLATEAU``).
+        opacity_scale: Factor on opacities: a splat's plateau is a little below 1
+            (``paper.constants.PLATEAU``).
         background: Whether to write the canvas's background.
         title: Title of the picture; empty: none.
         ids: Whether paths, and groups of neighbours of one colour, have identifiers after their colours.

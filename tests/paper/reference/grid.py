@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 
 from tests.reference.curves import Tensors, bezier, points_of, tangent
-from warpsplat.kernels import constants as k
+from warpsplat.paper import constants as k
 from warpsplat.scene import Kind, Scene
 
 

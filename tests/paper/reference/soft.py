@@ -7,7 +7,7 @@ import torch
 from tests.paper.reference.grid import Plan, differences, fill_grid
 from tests.paper.reference.splat import gaussian_values, straightness
 from tests.reference.curves import Tensors, bezier, points_of
-from warpsplat.kernels import constants as k
+from warpsplat.paper import constants as k
 from warpsplat.scene import Kind, Scene
 
 

@@ -6,7 +6,7 @@ import torch
 
 from tests.paper.reference.grid import Plan, differences, grids, runs_of
 from tests.reference.curves import Tensors
-from warpsplat.kernels import constants as k
+from warpsplat.paper import constants as k
 from warpsplat.scene import Scene
 
 

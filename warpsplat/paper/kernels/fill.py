@@ -7,11 +7,38 @@ chain 0 to chain 1 (paper eq. 4). Both chains have as many cubics.
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import cross, cubic_weights, local_weight, ring_index, segment_at
-from warpsplat.kernels.ranges import bounded_product, find_range
-from warpsplat.paper.kernels.strips import row_plan, row_position, station_plan
+from warpsplat.kernels.bezier import cross, cubic_weights
+from warpsplat.paper import constants as paper
+from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
 
 wp.set_module_options(constants.MODULE_OPTIONS)
+
+
+@wp.func
+def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
+    """Return the index of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from
+    point 0, chain 1 backwards; both end in the middle of the ring.
+    """
+    if chain == 0:
+        return i
+    return (point_count - i) % point_count
+
+
+@wp.func
+def segment_at(t: wp.float32, segment_count: wp.int32) -> wp.int32:
+    """Return the segment that holds parameter ``t`` in [0, segment_count] of a chain."""
+    return wp.clamp(int(wp.floor(t)), 0, segment_count - 1)
+
+
+@wp.func
+def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32:
+    """Return the weight of chain control point ``i`` where the chain is in ``segment``; 0 outside its
+    support.
+    """
+    j = i - 3 * segment
+    if j < 0 or j > 3:
+        return 0.0
+    return weights[j]
 
 
 @wp.func
@@ -38,7 +65,7 @@ def measure_strip(points: wp.array[wp.vec2], start: wp.int32, cubics: wp.int32, 
     """Return the length of the longer chain of an outline, the mean width of the strip between its chains,
     and twice its signed area.
     """
-    count = constants.PLAN_SAMPLES * cubics
+    count = paper.PLAN_SAMPLES * cubics
     a0 = scale * points[start]
     b0 = a0
     length_a = float(0.0)
@@ -46,7 +73,7 @@ def measure_strip(points: wp.array[wp.vec2], start: wp.int32, cubics: wp.int32, 
     width = float(0.0)
     doubled_area = float(0.0)
     for i in range(1, count + 1):
-        t = float(i) / float(constants.PLAN_SAMPLES)
+        t = float(i) / float(paper.PLAN_SAMPLES)
         a1 = scale * chain_point(points, start, 0, t, cubics)
         b1 = scale * chain_point(points, start, 1, t, cubics)
         length_a += wp.length(a1 - a0)
@@ -91,48 +118,17 @@ def plan_fill(
     shape_sign[shape] = wp.sign(strip[2])
 
 
-@wp.kernel
-def fill_grid_forward(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    scale: wp.float32,
-    gaussian_ends: wp.array[wp.int32],  # [shape_count]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_reach: wp.array[wp.float32],  # [shape_count]
-    # Out:
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity] u of the row
-    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
-):
+@wp.func
+def fill_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
     """X(r, k) = (1 - u_r) B0(t_k) + u_r B1(t_k) (paper eq. 4 and 5), t_k at the middle of its cell."""
-    i = offset + wp.tid()
-    shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
-    if shape >= gaussian_ends.shape[0]:
-        gaussian_shape[i] = -1
-        return
-    if kind[shape] != constants.FILL:
-        return
-    gaussian_shape[i] = -1
-    if i >= gaussian_last[shape]:
-        return
-    stations = shape_stations[shape]
-    row = (i - gaussian_first[shape]) / stations
-    station = (i - gaussian_first[shape]) % stations
-    start = point_first[shape]
-    cubics = chain_cubics(point_first, shape)
-    t = (float(station) + 0.5) * float(cubics) / float(stations)
-    u = row_position(row, shape_rows[shape], shape_reach[shape])
-    a = chain_point(points, start, 0, t, cubics)
-    b = chain_point(points, start, 1, t, cubics)
-    gaussian_shape[i] = shape
-    gaussian_across[i] = u
-    mean[i] = scale * ((1.0 - u) * a + u * b)
+    cubics = p.count / 6
+    t = (float(p.station) + 0.5) * float(cubics) / float(p.stations)
+    a = chain_point(points, p.start, 0, t, cubics)
+    b = chain_point(points, p.start, 1, t, cubics)
+    return (1.0 - p.u) * a + p.u * b
+
+
+fill_grid_forward = make_grid_forward("fill_grid_forward", constants.FILL, fill_position)
 
 
 @wp.kernel

@@ -17,6 +17,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross
+from warpsplat.paper import constants as paper
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -61,10 +62,74 @@ def straightness(
 
 
 @wp.func
+def differences_at(
+    mean: wp.array[wp.vec2], i: wp.int32, index: wp.int32, stations: wp.int32, run: wp.int32, rows: wp.int32
+):
+    """Return Dx, Dr and the straightness at Gaussian ``i``, number ``index`` of its shape."""
+    station = (index % stations) % run
+    dx = difference(mean, i, 1, station, run)
+    dr = difference(mean, i, stations, index / stations, rows)
+    return dx, dr, straightness(mean, i, 1, station, run)
+
+
+@wp.func
+def conic_and_extent(e: wp.vec2, variance_x: wp.float32, variance_y: wp.float32, cut: wp.float32):
+    """Return the inverse covariance of a Gaussian along the unit vector ``e``, and the half size of the box
+    where q <= ``cut``.
+    """
+    ix = 1.0 / variance_x
+    iy = 1.0 / variance_y
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    return (
+        wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy),
+        wp.vec2(
+            wp.sqrt(cut * (cc * variance_x + ss * variance_y)),
+            wp.sqrt(cut * (ss * variance_x + cc * variance_y)),
+        ),
+    )
+
+
+@wp.func
+def conic_adjoint(e: wp.vec2, g: wp.vec3) -> wp.vec3:
+    """Return the gradients of ix, of iy, and of the angle over ix - iy from those of (a, b, c)."""
+    cc = e[0] * e[0]
+    ss = e[1] * e[1]
+    cs = e[0] * e[1]
+    return wp.vec3(
+        cc * g[0] + cs * g[1] + ss * g[2],
+        ss * g[0] - cs * g[1] + cc * g[2],
+        -2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2],
+    )
+
+
+@wp.func
+def difference_grads(
+    dx: wp.vec2,
+    dr: wp.vec2,
+    length_grad: wp.float32,
+    h_grad: wp.float32,
+    angle_grad: wp.float32,
+    fold: wp.float32,
+):
+    """Return the gradients of Dx and Dr; ``fold``: weight of the folded area x the outline's orientation."""
+    length = wp.length(dx)
+    e = dx / length
+    n = wp.vec2(-e[1], e[0])
+    along = length_grad * e + ((angle_grad - h_grad * wp.dot(e, dr)) / length) * n
+    across = h_grad * n
+    if fold * wp.dot(n, dr) < 0.0:
+        along -= fold * wp.vec2(dr[1], -dr[0])
+        across -= fold * wp.vec2(-dx[1], dx[0])
+    return along, across
+
+
+@wp.func
 def variance(spacing: wp.float32) -> wp.float32:
     """Return a Gaussian's variance along one of its axes [px^2]."""
-    reach = constants.SPREAD * constants.SPREAD * spacing * spacing
-    return reach + constants.PIXEL_SIGMA * constants.PIXEL_SIGMA
+    reach = paper.SPREAD * paper.SPREAD * spacing * spacing
+    return reach + paper.PIXEL_SIGMA * paper.PIXEL_SIGMA
 
 
 @wp.kernel
@@ -89,34 +154,22 @@ def gaussians_forward(
         return
     stations = shape_stations[shape]
     index = i - gaussian_first[shape]
-    dx = difference(
-        mean, i, 1, (index % stations) % (stations / shape_runs[shape]), stations / shape_runs[shape]
+    dx, dr, straight = differences_at(
+        mean, i, index, stations, stations / shape_runs[shape], shape_rows[shape]
     )
-    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
-    run = stations / shape_runs[shape]
     length = wp.length(dx)
-    reach = straightness(mean, i, 1, (index % stations) % run, run) * length
     e = wp.vec2(1.0, 0.0)
     across = wp.length(dr)
     if length >= constants.EPSILON:
         e = dx / length
         across = cross(e, dr)
-    variance_x = variance(reach)
-    variance_y = variance(across)
-    ix = 1.0 / variance_x
-    iy = 1.0 / variance_y
-    cc = e[0] * e[0]
-    ss = e[1] * e[1]
-    cs = e[0] * e[1]
-    conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
-    q_cut = float(constants.Q_INNER)
+    q_cut = float(paper.Q_INNER)
     if index < stations or index / stations == shape_rows[shape] - 1:
-        q_cut = constants.Q_MAX
+        q_cut = paper.Q_MAX
     cut[i] = q_cut
-    extent[i] = wp.vec2(
-        wp.sqrt(q_cut * (cc * variance_x + ss * variance_y)),
-        wp.sqrt(q_cut * (ss * variance_x + cc * variance_y)),
-    )
+    inverse, box = conic_and_extent(e, variance(straight * length), variance(across), q_cut)
+    conic[i] = inverse
+    extent[i] = box
 
 
 @wp.kernel
@@ -157,36 +210,22 @@ def differences_backward(
     across_grad[i] = wp.vec2(0.0, 0.0)
     stations = shape_stations[shape]
     index = i - gaussian_first[shape]
-    dx = difference(
-        mean, i, 1, (index % stations) % (stations / shape_runs[shape]), stations / shape_runs[shape]
+    dx, dr, straight = differences_at(
+        mean, i, index, stations, stations / shape_runs[shape], shape_rows[shape]
     )
-    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
     length = wp.length(dx)
     if length < constants.EPSILON:
         return
     e = dx / length
-    n = wp.vec2(-e[1], e[0])
-    h = wp.dot(n, dr)
-    run = stations / shape_runs[shape]
-    straight = straightness(mean, i, 1, (index % stations) % run, run)
+    h = wp.dot(wp.vec2(-e[1], e[0]), dr)
     reach = straight * length
     ix = 1.0 / variance(reach)
     iy = 1.0 / variance(h)
-    g = through_scales * conic_grad[i]
-    cc = e[0] * e[0]
-    ss = e[1] * e[1]
-    cs = e[0] * e[1]
-    ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
-    iy_grad = ss * g[0] - cs * g[1] + cc * g[2]
-    length_grad = -2.0 * constants.SPREAD * constants.SPREAD * straight * reach * ix * ix * ix_grad
-    h_grad = -2.0 * constants.SPREAD * constants.SPREAD * h * iy * iy * iy_grad
-    angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2]) - h_grad * wp.dot(e, dr)
-    along = length_grad * e + (angle_grad / length) * n
-    across = h_grad * n
-    sign = shape_sign[shape]
-    if sign * h < 0.0:
-        along -= fold_factor * sign * wp.vec2(dr[1], -dr[0])
-        across -= fold_factor * sign * wp.vec2(-dx[1], dx[0])
+    g = conic_adjoint(e, through_scales * conic_grad[i])
+    length_grad = -2.0 * paper.SPREAD * paper.SPREAD * straight * reach * ix * ix * g[0]
+    h_grad = -2.0 * paper.SPREAD * paper.SPREAD * h * iy * iy * g[1]
+    fold = fold_factor * shape_sign[shape]
+    along, across = difference_grads(dx, dr, length_grad, h_grad, (ix - iy) * g[2], fold)
     along_grad[i] = along
     across_grad[i] = across
 

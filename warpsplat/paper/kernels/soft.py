@@ -18,11 +18,16 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
-from warpsplat.kernels.ranges import bounded_product, find_range
+from warpsplat.paper import constants as paper
 from warpsplat.paper.kernels.fill import chain_cubics, measure_strip
-from warpsplat.paper.kernels.gaussians import difference, straightness
-from warpsplat.paper.kernels.strips import row_plan, station_plan
-from warpsplat.paper.kernels.stroke import longest_segment
+from warpsplat.paper.kernels.gaussians import (
+    conic_adjoint,
+    conic_and_extent,
+    difference_grads,
+    differences_at,
+)
+from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
+from warpsplat.paper.kernels.stroke import longest_segment, weighted_point
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -73,42 +78,15 @@ def plan_soft(
     gaussian_count[shape] = bounded_product(shape_stations[shape], shape_rows[shape])
 
 
-@wp.kernel
-def soft_stroke_forward(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    scale: wp.float32,
-    gaussian_ends: wp.array[wp.int32],  # [shape_count]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    # Out:
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
-):
+@wp.func
+def soft_stroke_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
     """X(k) = B(t_k) (paper eq. 3), t_k at the middle of its cell."""
-    i = offset + wp.tid()
-    shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
-    if shape >= gaussian_ends.shape[0]:
-        gaussian_shape[i] = -1
-        return
-    if kind[shape] != constants.STROKE:
-        return
-    gaussian_shape[i] = -1
-    if i >= gaussian_last[shape]:
-        return
-    start = point_first[shape]
-    each = shape_stations[shape] / ((point_first[shape + 1] - start) / 3)
-    station = i - gaussian_first[shape]
-    weights = cubic_weights((float(station % each) + 0.5) / float(each))
-    position = wp.vec2(0.0, 0.0)
-    for j in range(4):
-        position += weights[j] * points[start + 3 * (station / each) + j]
-    gaussian_shape[i] = shape
-    mean[i] = scale * position
+    each = p.stations / (p.count / 3)
+    weights = cubic_weights((float(p.station % each) + 0.5) / float(each))
+    return weighted_point(points, p.start + 3 * (p.station / each), weights)
+
+
+soft_stroke_forward = make_grid_forward("soft_stroke_forward", constants.STROKE, soft_stroke_position)
 
 
 @wp.func
@@ -144,32 +122,23 @@ def soft_gaussians_forward(
         return
     stations = shape_stations[shape]
     index = i - gaussian_first[shape]
-    station = index % stations
-    dx = difference(mean, i, 1, station, stations)
-    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
+    dx, dr, straight = differences_at(mean, i, index, stations, stations, shape_rows[shape])
     length = wp.length(dx)
-    reach = constants.SPREAD * straightness(mean, i, 1, station, stations) * length
+    reach = paper.SPREAD * straight * length
     e = wp.vec2(1.0, 0.0)
     if length >= constants.EPSILON:
         e = dx / length
-    across = constants.SPREAD * cross(e, dr)
-    half = constants.WIDTH_SIGMA * scale * widths[shape]
-    least = scale * scale * softness * softness + constants.PIXEL_VARIANCE
-    variance_x = reach * reach + least
-    variance_y = across * across + half * half + least
-    ix = 1.0 / variance_x
-    iy = 1.0 / variance_y
-    cc = e[0] * e[0]
-    ss = e[1] * e[1]
-    cs = e[0] * e[1]
-    conic[i] = wp.vec3(cc * ix + ss * iy, cs * (ix - iy), ss * ix + cc * iy)
-    cut[i] = constants.Q_SOFT
-    extent[i] = wp.vec2(
-        wp.sqrt(constants.Q_SOFT * (cc * variance_x + ss * variance_y)),
-        wp.sqrt(constants.Q_SOFT * (ss * variance_x + cc * variance_y)),
+    across = paper.SPREAD * cross(e, dr)
+    half = paper.WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + paper.PIXEL_VARIANCE
+    inverse, box = conic_and_extent(
+        e, reach * reach + least, across * across + half * half + least, paper.Q_SOFT
     )
-    opacity = opacities[shape] + fades[shape][third(station, stations)]
-    strength[i] = constants.GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
+    conic[i] = inverse
+    cut[i] = paper.Q_SOFT
+    extent[i] = box
+    opacity = opacities[shape] + fades[shape][third(index % stations, stations)]
+    strength[i] = paper.GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
 
 
 @wp.kernel
@@ -202,43 +171,28 @@ def soft_differences_backward(
         return
     stations = shape_stations[shape]
     index = i - gaussian_first[shape]
-    station = index % stations
-    dx = difference(mean, i, 1, station, stations)
-    dr = difference(mean, i, stations, index / stations, shape_rows[shape])
+    dx, dr, straight = differences_at(mean, i, index, stations, stations, shape_rows[shape])
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
     if length >= constants.EPSILON:
         e = dx / length
-    n = wp.vec2(-e[1], e[0])
-    h = wp.dot(n, dr)
-    straight = straightness(mean, i, 1, station, stations)
-    reach = constants.SPREAD * straight * length
-    half = constants.WIDTH_SIGMA * scale * widths[shape]
-    least = scale * scale * softness * softness + constants.PIXEL_VARIANCE
+    h = wp.dot(wp.vec2(-e[1], e[0]), dr)
+    reach = paper.SPREAD * straight * length
+    half = paper.WIDTH_SIGMA * scale * widths[shape]
+    least = scale * scale * softness * softness + paper.PIXEL_VARIANCE
     ix = 1.0 / (reach * reach + least)
-    iy = 1.0 / (constants.SPREAD * constants.SPREAD * h * h + half * half + least)
-    g = conic_grad[i]
-    cc = e[0] * e[0]
-    ss = e[1] * e[1]
-    cs = e[0] * e[1]
-    variance_grad = -iy * iy * (ss * g[0] - cs * g[1] + cc * g[2])
-    gaussian_width_grad[i] = 2.0 * constants.WIDTH_SIGMA * scale * half * variance_grad
+    iy = 1.0 / (paper.SPREAD * paper.SPREAD * h * h + half * half + least)
+    g = conic_adjoint(e, conic_grad[i])
+    variance_grad = -iy * iy * g[1]
+    gaussian_width_grad[i] = 2.0 * paper.WIDTH_SIGMA * scale * half * variance_grad
     along = wp.vec2(0.0, 0.0)
     across = wp.vec2(0.0, 0.0)
     if length >= constants.EPSILON:
-        g = through_scales * g
-        variance_grad = through_scales * variance_grad
-        ix_grad = cc * g[0] + cs * g[1] + ss * g[2]
-        length_grad = -2.0 * constants.SPREAD * straight * reach * ix * ix * ix_grad
-        h_grad = 2.0 * constants.SPREAD * constants.SPREAD * h * variance_grad
-        angle_grad = (ix - iy) * (-2.0 * cs * g[0] + (cc - ss) * g[1] + 2.0 * cs * g[2])
-        angle_grad -= h_grad * wp.dot(e, dr)
-        along = length_grad * e + (angle_grad / length) * n
-        across = h_grad * n
-        sign = shape_sign[shape]
-        if sign * h < 0.0:
-            along -= fold_factor * sign * wp.vec2(dr[1], -dr[0])
-            across -= fold_factor * sign * wp.vec2(-dx[1], dx[0])
+        length_grad = -2.0 * paper.SPREAD * straight * reach * ix * ix * (through_scales * g[0])
+        h_grad = 2.0 * paper.SPREAD * paper.SPREAD * h * (through_scales * variance_grad)
+        fold = fold_factor * shape_sign[shape]
+        angle_grad = (ix - iy) * (through_scales * g[2])
+        along, across = difference_grads(dx, dr, length_grad, h_grad, angle_grad, fold)
     along_grad[i] = along
     across_grad[i] = across
 
@@ -302,7 +256,7 @@ def soft_shapes_backward(
     sums = wp.vec3(0.0, 0.0, 0.0)
     for i in range(gaussian_first[shape], gaussian_last[shape]):
         k = third((i - gaussian_first[shape]) % stations, stations)
-        sums[k] = sums[k] + constants.GAUSSIAN_MAX * strength_grad[i]
+        sums[k] = sums[k] + paper.GAUSSIAN_MAX * strength_grad[i]
         width += gaussian_width_grad[i]
     for k in range(3):
         opacity = opacities[shape] + fades[shape][k]

@@ -14,6 +14,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.tile import column, total
+from warpsplat.paper import constants as paper
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -121,7 +122,7 @@ def make_forward(name: str, *, soft: bool) -> wp.Kernel:
                         if soft:  # noqa: SIM108  # a conditional expression would read strength always
                             g = strength[j] * g
                         else:
-                            g = wp.min(g, column(constants.GAUSSIAN_MAX))
+                            g = wp.min(g, column(paper.GAUSSIAN_MAX))
                         k = (x - left) % constants.TILE
                         coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
                         x += lanes
@@ -185,7 +186,7 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
             y_first = wp.max(shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / constants.TILE)
             y_stop = int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / constants.TILE + 1
             one = column(1.0)
-            most = column(constants.GAUSSIAN_MAX)
+            most = column(paper.GAUSSIAN_MAX)
             least = column(EXPONENT * cut[i])
             rows = rows_of_tile()
             sum_x = zero

@@ -9,11 +9,62 @@ inside the path.
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.elementary import normal_quantile, normal_tail
+from warpsplat.kernels.ranges import find_range
+from warpsplat.paper import constants as paper
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 EDGE_MIN = wp.constant(2.0e-7)  # beyond, 1 - 2 x edge would be 1
+SQRT_HALF = wp.constant(0.7071067811865476)
+TAIL_MAX = wp.constant(4.0)  # beyond this times the square root of 2, a normal variable has a chance of 8e-9
+HALVINGS = wp.constant(26)  # of an interval of that length: to a float's last bits
+
+
+@wp.func
+def bounded_product(a: wp.int32, b: wp.int32) -> wp.int32:
+    """Return ``a`` times ``b``, clamped to [0, COUNT_MAX]."""
+    return wp.int32(wp.clamp(wp.int64(a) * wp.int64(b), wp.int64(0), wp.int64(paper.COUNT_MAX)))
+
+
+@wp.func
+def normal_tail(z: wp.float32) -> wp.float32:
+    """Chance that a normal variable exceeds ``z`` >= 0 standard deviations.
+
+    Up to the square root of 2, by a polynomial in z^2; beyond, by one whose 16th power is the inverse of the
+    complementary error function. Both are Chebyshev interpolants.
+    """
+    x = wp.min(z * SQRT_HALF, TAIL_MAX)
+    if x < 1.0:
+        s = x * x
+        p = 1.12837913 + s * (
+            -0.376123438 + s * (0.112803167 + s * (-0.0267150542 + s * (0.00492176203 + s * -0.000564805987)))
+        )
+        return 0.5 - 0.5 * x * p
+    t = (x - 2.5) / 1.5
+    low = 1.62893424 + t * (0.817421711 + t * (0.421312806 + t * (0.146538078 + t * 0.0466382937)))
+    high = 0.0129177276 + t * (
+        0.00315187556 + t * (0.000746777281 + t * (0.000168796991 + t * 3.4582237e-05))
+    )
+    t2 = t * t
+    r = low + t2 * t2 * t * high
+    r2 = r * r
+    r4 = r2 * r2
+    r8 = r4 * r4
+    return 0.5 / (r8 * r8)
+
+
+@wp.func
+def normal_quantile(tail: wp.float32) -> wp.float32:
+    """Standard deviations that a normal variable exceeds with the chance ``tail``, from 1e-8 to 0.5."""
+    low = float(0.0)
+    high = TAIL_MAX / SQRT_HALF
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if normal_tail(middle) > tail:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @wp.func
@@ -21,11 +72,11 @@ def row_plan(width: wp.float32) -> wp.vec2:
     """(row count, reach) for a strip ``width`` [px] wide."""
     # The outermost row at a quarter of the strip at the most: two rows are the least. And so far inside a
     # strip of millions of pixels that a float can tell.
-    edge = wp.clamp(constants.ROW_INSET / wp.max(width, constants.EPSILON), EDGE_MIN, 0.25)
+    edge = wp.clamp(paper.ROW_INSET / wp.max(width, constants.EPSILON), EDGE_MIN, 0.25)
     reach = normal_quantile(edge)
     # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
     # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.
-    step = constants.ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
+    step = paper.ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
     return wp.vec2(wp.max(2.0, wp.ceil(2.0 * reach / step) + 1.0), reach)
 
 
@@ -42,5 +93,74 @@ def row_position(row: wp.int32, rows: wp.int32, reach: wp.float32) -> wp.float32
 @wp.func
 def station_plan(length: wp.float32) -> wp.int32:
     """Stations along a curve ``length`` [px] long."""
-    count = wp.max(length / constants.STATION_SPACING, constants.STATION_DENSITY * wp.sqrt(length))
-    return wp.max(constants.STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
+    count = wp.max(length / paper.STATION_SPACING, paper.STATION_DENSITY * wp.sqrt(length))
+    return wp.max(paper.STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
+
+
+@wp.struct
+class Place:
+    """Place of a Gaussian in the grid of its shape."""
+
+    start: wp.int32  # first control point of the shape
+    count: wp.int32  # of control points
+    width: wp.float32  # canvas units
+    scale: wp.float32
+    stations: wp.int32
+    runs: wp.int32
+    rows: wp.int32
+    station: wp.int32
+    u: wp.float32  # of its row
+
+
+def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Kernel:
+    """Return the kernel that puts the Gaussians of shapes of ``own_kind`` at ``position``, a function of the
+    control points and a ``Place`` [canvas units].
+    """
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def forward(
+        # In:
+        offset: wp.int32,
+        points: wp.array[wp.vec2],  # [point_count] canvas units
+        widths: wp.array[wp.float32],  # [shape_count] canvas units
+        kind: wp.array[wp.int32],  # [shape_count]
+        point_first: wp.array[wp.int32],  # [shape_count + 1]
+        scale: wp.float32,
+        gaussian_ends: wp.array[wp.int32],  # [shape_count]
+        gaussian_first: wp.array[wp.int32],  # [shape_count]
+        gaussian_last: wp.array[wp.int32],  # [shape_count]
+        shape_stations: wp.array[wp.int32],  # [shape_count]
+        shape_runs: wp.array[wp.int32],  # [shape_count]
+        shape_rows: wp.array[wp.int32],  # [shape_count]
+        shape_reach: wp.array[wp.float32],  # [shape_count]
+        # Out:
+        gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
+        gaussian_across: wp.array[wp.float32],  # [gaussian_capacity] u of the row
+        mean: wp.array[wp.vec2],  # [gaussian_capacity] px
+    ):
+        """One thread a Gaussian."""
+        i = offset + wp.tid()
+        shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
+        if shape >= gaussian_ends.shape[0]:
+            gaussian_shape[i] = -1
+            return
+        if kind[shape] != own_kind:
+            return
+        gaussian_shape[i] = -1
+        if i >= gaussian_last[shape]:
+            return
+        place = Place()
+        place.start = point_first[shape]
+        place.count = point_first[shape + 1] - point_first[shape]
+        place.width = widths[shape]
+        place.scale = scale
+        place.stations = shape_stations[shape]
+        place.runs = shape_runs[shape]
+        place.rows = shape_rows[shape]
+        place.station = (i - gaussian_first[shape]) % place.stations
+        place.u = row_position((i - gaussian_first[shape]) / place.stations, place.rows, shape_reach[shape])
+        gaussian_shape[i] = shape
+        gaussian_across[i] = place.u
+        mean[i] = scale * position(points, place)
+
+    return forward

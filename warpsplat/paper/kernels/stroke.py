@@ -8,14 +8,21 @@ The stations of a segment are a run, without neighbours in the other runs.
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import cubic_tangent_weights, cubic_weights
+from warpsplat.kernels.bezier import cubic_weights
 from warpsplat.kernels.elementary import sine_and_cosine
-from warpsplat.kernels.ranges import bounded_product, find_range
-from warpsplat.paper.kernels.strips import row_plan, row_position, station_plan
+from warpsplat.paper import constants as paper
+from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 HALF_PI = wp.constant(1.5707963267948966)
+
+
+@wp.func
+def cubic_tangent_weights(t: wp.float32) -> wp.vec4:
+    """Return the derivatives of ``cubic_weights`` by ``t``; they sum to 0."""
+    s = 1.0 - t
+    return wp.vec4(-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t)
 
 
 @wp.func
@@ -33,8 +40,8 @@ def longest_segment(
     for segment in range(segments):
         before = scale * points[start + 3 * segment]
         length = float(0.0)
-        for i in range(1, constants.PLAN_SAMPLES + 1):
-            weights = cubic_weights(float(i) / float(constants.PLAN_SAMPLES))
+        for i in range(1, paper.PLAN_SAMPLES + 1):
+            weights = cubic_weights(float(i) / float(paper.PLAN_SAMPLES))
             here = wp.vec2(0.0, 0.0)
             for j in range(4):
                 here += scale * weights[j] * points[start + 3 * segment + j]
@@ -83,7 +90,7 @@ def run_place(station: wp.int32, run: wp.int32, rows: wp.int32, width: wp.float3
     """
     caps = cap_plan(rows)
     # A cap's last Gaussians stay as far inside the circle as the outermost rows inside the sides.
-    radius = wp.max(1.0 - 2.0 * constants.ROW_INSET / wp.max(width, constants.EPSILON), 0.5)
+    radius = wp.max(1.0 - 2.0 * paper.ROW_INSET / wp.max(width, constants.EPSILON), 0.5)
     if station < caps:
         angle = HALF_PI * (float(caps - station) - 0.25) / float(caps)
         direction = sine_and_cosine(angle)
@@ -114,54 +121,20 @@ def weighted_point(points: wp.array[wp.vec2], point: wp.int32, weights: wp.vec4)
     return total
 
 
-@wp.kernel
-def stroke_grid_forward(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    widths: wp.array[wp.float32],  # [shape_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    scale: wp.float32,
-    gaussian_ends: wp.array[wp.int32],  # [shape_count]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_reach: wp.array[wp.float32],  # [shape_count]
-    # Out:
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity] u of the row
-    mean: wp.array[wp.vec2],  # [gaussian_capacity] px
-):
+@wp.func
+def stroke_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
     """X(r, k) = B(t_k) + width / 2 (along_k e_k + across_k (2 u_r - 1) n_k), e the unit tangent, n = e
     turned by a right angle. A tangent of length 0 (coinciding control points) counts as (1, 0).
     """
-    i = offset + wp.tid()
-    shape = find_range(gaussian_ends, gaussian_ends.shape[0], i)
-    if shape >= gaussian_ends.shape[0]:
-        gaussian_shape[i] = -1
-        return
-    if kind[shape] != constants.STROKE:
-        return
-    gaussian_shape[i] = -1
-    if i >= gaussian_last[shape]:
-        return
-    stations = shape_stations[shape]
-    rows = shape_rows[shape]
-    row = (i - gaussian_first[shape]) / stations
-    station = (i - gaussian_first[shape]) % stations
-    run = stations / shape_runs[shape]
-    place = run_place(station % run, run, rows, scale * widths[shape])
-    point = point_first[shape] + 3 * (station / run)
-    centre = weighted_point(points, point, cubic_weights(place[0]))
+    run = p.stations / p.runs
+    place = run_place(p.station % run, run, p.rows, p.scale * p.width)
+    point = p.start + 3 * (p.station / run)
     e = unit_tangent(weighted_point(points, point, cubic_tangent_weights(place[0])))
-    u = row_position(row, rows, shape_reach[shape])
-    away = place[1] * e + place[2] * (2.0 * u - 1.0) * wp.vec2(-e[1], e[0])
-    gaussian_shape[i] = shape
-    gaussian_across[i] = u
-    mean[i] = scale * (centre + 0.5 * widths[shape] * away)
+    away = place[1] * e + place[2] * (2.0 * p.u - 1.0) * wp.vec2(-e[1], e[0])
+    return weighted_point(points, point, cubic_weights(place[0])) + 0.5 * p.width * away
+
+
+stroke_grid_forward = make_grid_forward("stroke_grid_forward", constants.STROKE, stroke_position)
 
 
 @wp.kernel

@@ -1,0 +1,486 @@
+"""Padded gradients from a circle's centre or along a line, column by column: the most common ones.
+
+The same as ``gradient``, as vector arithmetic: along a column of pixels both coordinates in unit space go by
+constant steps. The colour at t is that of the first stop and, for each interval, the clamped share of its
+second stop times the difference of the two. Two ascending stops (a ramp) have kernels of their own; of more
+(a chain, in any order) only those intervals that a column reaches are computed, which are one or two.
+"""
+
+import warp as wp
+
+from warpsplat.kernels import constants
+from warpsplat.kernels.paint.gradient import (
+    CHAIN,
+    GENERAL,
+    RAMP,
+    Gradients,
+    between_stops,
+    case_of,
+    frame,
+    is_gradient,
+    parameter,
+    pixel_place,
+    spread_out,
+    to_unit,
+    to_unit_adjoint,
+)
+from warpsplat.kernels.tile import column, total
+
+wp.set_module_options(constants.MODULE_OPTIONS)
+
+STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
+TINY = wp.constant(1.0e-12)
+
+
+@wp.func
+def rows() -> column:
+    """Return the indices of a column's pixels."""
+    result = column(0.0)
+    for i in range(constants.TILE):
+        result[i] = float(i)
+    return result
+
+
+@wp.func
+def roots(squares: column) -> column:
+    """Return the square root of each element."""
+    result = column(0.0)
+    for i in range(constants.TILE):
+        result[i] = wp.sqrt(squares[i])
+    return result
+
+
+@wp.func
+def share_of_second(t: column, start: wp.float32, width: wp.float32) -> column:
+    """Return the share of the second stop at parameters ``t``."""
+    linear = (t - column(start)) / width
+    return wp.min(wp.max(linear, column(0.0)), column(1.0))
+
+
+@wp.func
+def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
+    """Return the share of an interval's second stop at parameters ``t``; two stops in one place are a
+    step.
+    """
+    if after > before:
+        return share_of_second(t, before, after - before)
+    return wp.min(wp.max(STEEP * (t - column(before)) + column(1.0), column(0.0)), column(1.0))
+
+
+@wp.func
+def color_chain(
+    g: Gradients, shape: wp.int32, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+):
+    """Colour a column of pixels at parameters ``t`` of a chain."""
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
+    lowest = wp.min(t)
+    highest = wp.max(t)
+    color = g.stop_colors[first]
+    red = column(color[0])
+    green = column(color[1])
+    blue = column(color[2])
+    opacity = column(g.stop_opacities[first])
+    before = g.stop_offsets[first]
+    for k in range(first, last - 1):
+        after = wp.max(before, g.stop_offsets[k + 1])
+        color = g.stop_colors[k + 1]
+        if lowest >= after:
+            red = column(color[0])
+            green = column(color[1])
+            blue = column(color[2])
+            opacity = column(g.stop_opacities[k + 1])
+        elif highest >= before:
+            share = share_of_next(t, before, after)
+            between = color - g.stop_colors[k]
+            red = red + between[0] * share
+            green = green + between[1] * share
+            blue = blue + between[2] * share
+            opacity = opacity + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * share
+        before = after
+    paint_columns[slot, 0, x] = red
+    paint_columns[slot, 1, x] = green
+    paint_columns[slot, 2, x] = blue
+    paint_columns[slot, 3, x] = opacity
+
+
+def make_forward(name: str, case: int) -> wp.Kernel:
+    """Return the kernel of RAMP, CHAIN or GENERAL gradients."""
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def forward(
+        # In:
+        offset: wp.int32,
+        lane_columns: wp.int32,  # columns of a tile that a thread handles
+        tiles_x: wp.int32,
+        scale: wp.float32,
+        slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+        slot_tile: wp.array[wp.int32],  # [slot_capacity]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        g: Gradients,
+        # Out:
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
+        paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
+    ):
+        """Colour the pixels of visible slots. One thread a slot and lane."""
+        i, lane = wp.tid()
+        slot = offset + i
+        shape = slot_shape[slot]
+        if shape < 0:
+            return
+        state = slot_state[slot]
+        if not is_gradient(g.paint[shape]) or state & constants.COVERED == 0 or state & constants.HIDDEN != 0:
+            return
+        if case_of(g, shape) != case:
+            return
+        first = g.stop_first[shape]
+        last = g.stop_first[shape + 1]
+        own_paint = g.paint[shape]
+        own_focus = g.focus[shape]
+        own_spread = g.spread[shape]
+        f = g.frames[shape]
+        if case == RAMP:
+            start = g.stop_offsets[first]
+            width = g.stop_offsets[first + 1] - start
+            low = g.stop_colors[first]
+            high = g.stop_colors[first + 1]
+            low_opacity = g.stop_opacities[first]
+            high_opacity = g.stop_opacities[first + 1]
+        down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
+        row = rows()
+        for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+            if case == GENERAL:
+                for y in range(constants.TILE):
+                    place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
+                    t = spread_out(own_spread, parameter(own_paint, own_focus, place)[0])
+                    at = between_stops(g.stop_offsets, first, last, t[0])
+                    color = (1.0 - at.share) * g.stop_colors[at.low] + at.share * g.stop_colors[at.high]
+                    p = constants.TILE * x + y
+                    for channel in range(3):
+                        paint_pixels[slot, channel, p] = color[channel]
+                    opacity = g.stop_opacities[at.low]
+                    opacity += at.share * (g.stop_opacities[at.high] - opacity)
+                    paint_pixels[slot, 3, p] = opacity
+            else:
+                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                ts = column(top[0]) + down[0] * row
+                if own_paint != constants.LINEAR:
+                    v = column(top[1]) + down[1] * row
+                    ts = roots(wp.cw_mul(ts, ts) + wp.cw_mul(v, v))
+                if case == RAMP:
+                    share = share_of_second(ts, start, width)
+                    paint_columns[slot, 0, x] = column(low[0]) + (high[0] - low[0]) * share
+                    paint_columns[slot, 1, x] = column(low[1]) + (high[1] - low[1]) * share
+                    paint_columns[slot, 2, x] = column(low[2]) + (high[2] - low[2]) * share
+                    paint_columns[slot, 3, x] = column(low_opacity) + (high_opacity - low_opacity) * share
+                else:
+                    color_chain(g, shape, ts, slot, x, paint_columns)
+
+    return forward
+
+
+@wp.func
+def chain_backward_column(
+    g: Gradients,
+    shape: wp.int32,
+    t: column,
+    slot: wp.int32,
+    x: wp.int32,
+    paint_columns: wp.array3d[column],
+    stop_offsets_grad: wp.array[wp.float32],
+    stop_colors_grad: wp.array[wp.vec3],
+    stop_opacities_grad: wp.array[wp.float32],
+) -> column:
+    """Add the gradients of a chain's stops in a column of pixels; return those of ``t``.
+
+    The first stop takes all of a column's gradient but what the share of its interval passes on to the next
+    one, and so on. The offset of a stop that counts as lying where one before it does has no gradient.
+    """
+    red = paint_columns[slot, 0, x]
+    green = paint_columns[slot, 1, x]
+    blue = paint_columns[slot, 2, x]
+    opacity = paint_columns[slot, 3, x]
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
+    lowest = wp.min(t)
+    highest = wp.max(t)
+    color_rest = wp.vec3(total(red), total(green), total(blue))
+    opacity_rest = total(opacity)
+    slope = column(0.0)
+    at = first
+    before = g.stop_offsets[first]
+    own_before = int(1)
+    for k in range(first, last - 1):
+        after = wp.max(before, g.stop_offsets[k + 1])
+        own = wp.where(g.stop_offsets[k + 1] >= before, 1, 0)
+        if lowest >= after:
+            at = k + 1
+        elif highest >= before:
+            share = share_of_next(t, before, after)
+            on = wp.vec3(
+                total(wp.cw_mul(share, red)),
+                total(wp.cw_mul(share, green)),
+                total(wp.cw_mul(share, blue)),
+            )
+            opacity_on = total(wp.cw_mul(share, opacity))
+            stop_colors_grad[k] = stop_colors_grad[k] + (color_rest - on)
+            stop_opacities_grad[k] = stop_opacities_grad[k] + (opacity_rest - opacity_on)
+            color_rest = on
+            opacity_rest = opacity_on
+            at = k + 1
+            if after > before:
+                between = g.stop_colors[k + 1] - g.stop_colors[k]
+                step = between[0] * red + between[1] * green + between[2] * blue
+                step = step + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * opacity
+                step = step / (after - before)
+                # Beyond the two stops nothing changes with t.
+                step = wp.cw_mul(step, wp.min(STEEP * share, column(1.0)))
+                step = wp.cw_mul(step, wp.min(STEEP * (column(1.0) - share), column(1.0)))
+                later = total(wp.cw_mul(share, step))
+                if own_before == 1:
+                    stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
+                if own == 1:
+                    stop_offsets_grad[k + 1] = stop_offsets_grad[k + 1] - later
+                slope = slope + step
+        before = after
+        own_before = own
+    stop_colors_grad[at] = stop_colors_grad[at] + color_rest
+    stop_opacities_grad[at] = stop_opacities_grad[at] + opacity_rest
+    return slope
+
+
+@wp.kernel
+def gradient_backward(
+    # In:
+    offset: wp.int32,
+    tiles_x: wp.int32,
+    scale: wp.float32,
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_tile: wp.array[wp.int32],  # [slot_capacity]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
+    spread: wp.array[wp.int32],  # [shape_count]
+    frames: wp.array[frame],  # [shape_count]
+    focus: wp.array[wp.vec3],  # [shape_count]
+    stop_first: wp.array[wp.int32],  # [shape_count + 1]
+    stop_offsets: wp.array[wp.float32],  # [stop_count]
+    stop_colors: wp.array[wp.vec3],  # [stop_count]
+    stop_opacities: wp.array[wp.float32],  # [stop_count]
+    g: Gradients,  # the same, for ``case_of``
+    paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] gradients of colour and opacity
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] written
+    stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+    stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+    stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
+):
+    """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated as
+    a constant. One thread a shape.
+    """
+    shape = offset + wp.tid()
+    if not is_gradient(paint[shape]):
+        return
+    first = stop_first[shape]
+    last = stop_first[shape + 1]
+    if case_of(g, shape) != GENERAL:
+        return
+    for i in range(first, last):
+        stop_offsets_grad[i] = 0.0
+        stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
+        stop_opacities_grad[i] = 0.0
+    f = frames[shape]
+    origin = wp.vec2(0.0, 0.0)
+    along = wp.vec2(0.0, 0.0)
+    across = wp.vec2(0.0, 0.0)
+    for slot in range(slot_first[shape], slot_last[shape]):
+        state = slot_state[slot]
+        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+            for p in range(constants.TILE * constants.TILE):
+                color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
+                opacity = paint_pixels[slot, 3, p]
+                place = to_unit(
+                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
+                )
+                raw = parameter(paint[shape], focus[shape], place)
+                t = spread_out(spread[shape], raw[0])
+                at = between_stops(stop_offsets, first, last, t[0])
+                low_share = 1.0 - at.share
+                stop_colors_grad[at.low] = stop_colors_grad[at.low] + low_share * color
+                stop_colors_grad[at.high] = stop_colors_grad[at.high] + at.share * color
+                stop_opacities_grad[at.low] = stop_opacities_grad[at.low] + low_share * opacity
+                stop_opacities_grad[at.high] = stop_opacities_grad[at.high] + at.share * opacity
+                if at.width > 0.0:
+                    step = wp.dot(color, stop_colors[at.high] - stop_colors[at.low])
+                    step += opacity * (stop_opacities[at.high] - stop_opacities[at.low])
+                    by_t = step / at.width
+                    if at.low_is_own == 1:
+                        stop_offsets_grad[at.low] = stop_offsets_grad[at.low] - low_share * by_t
+                    if at.high_is_own == 1:
+                        stop_offsets_grad[at.high] = stop_offsets_grad[at.high] - at.share * by_t
+                    move = (-by_t * t[1]) * to_unit_adjoint(f, wp.vec2(raw[1], raw[2]))
+                    origin += move
+                    along += place[0] * move
+                    across += place[1] * move
+    frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+
+
+def make_backward(name: str, case: int) -> wp.Kernel:
+    """Return the adjoint of RAMP or CHAIN gradients."""
+
+    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    def backward(
+        # In:
+        offset: wp.int32,
+        tiles_x: wp.int32,
+        scale: wp.float32,
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_tile: wp.array[wp.int32],  # [slot_capacity]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        g: Gradients,
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
+        # Out:
+        frames_grad: wp.array[frame],  # [shape_count] written
+        stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
+        stop_colors_grad: wp.array[wp.vec3],  # [stop_count] written
+        stop_opacities_grad: wp.array[wp.float32],  # [stop_count] written
+    ):
+        """Sum over a shape's visible slots in a fixed order: the same bits on every run. The focus is treated
+        as a constant. One thread a shape.
+        """
+        shape = offset + wp.tid()
+        if not is_gradient(g.paint[shape]):
+            return
+        if case_of(g, shape) != case:
+            return
+        first = g.stop_first[shape]
+        last = g.stop_first[shape + 1]
+        f = g.frames[shape]
+        zero = column(0.0)
+        one = column(1.0)
+        if case == RAMP:
+            start = g.stop_offsets[first]
+            width = g.stop_offsets[first + 1] - start
+            between = g.stop_colors[first + 1] - g.stop_colors[first]
+            opacity_between = g.stop_opacities[first + 1] - g.stop_opacities[first]
+            red = zero
+            green = zero
+            blue = zero
+            opacity = zero
+            red_high = zero
+            green_high = zero
+            blue_high = zero
+            opacity_high = zero
+            by_t = zero
+            by_t_high = zero
+        else:
+            for i in range(first, last):
+                stop_offsets_grad[i] = 0.0
+                stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
+                stop_opacities_grad[i] = 0.0
+        linear = g.paint[shape] == constants.LINEAR
+        down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
+        row = rows()
+        # Derivatives by the point in unit space, and the same times each coordinate.
+        by_u = zero
+        by_v = zero
+        u_by_u = zero
+        u_by_v = zero
+        v_by_u = zero
+        v_by_v = zero
+        columns = int(constants.TILE)  # a loop that is not unrolled, which takes long to compile
+        for slot in range(slot_first[shape], slot_last[shape]):
+            state = slot_state[slot]
+            if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+                for x in range(columns):
+                    top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                    u = column(top[0]) + down[0] * row
+                    v = column(top[1]) + down[1] * row
+                    t = u
+                    if not linear:
+                        t = roots(wp.cw_mul(u, u) + wp.cw_mul(v, v))
+                    if case == RAMP:
+                        share = share_of_second(t, start, width)
+                        g_red = paint_columns[slot, 0, x]
+                        g_green = paint_columns[slot, 1, x]
+                        g_blue = paint_columns[slot, 2, x]
+                        g_opacity = paint_columns[slot, 3, x]
+                        red = red + g_red
+                        green = green + g_green
+                        blue = blue + g_blue
+                        opacity = opacity + g_opacity
+                        red_high = red_high + wp.cw_mul(share, g_red)
+                        green_high = green_high + wp.cw_mul(share, g_green)
+                        blue_high = blue_high + wp.cw_mul(share, g_blue)
+                        opacity_high = opacity_high + wp.cw_mul(share, g_opacity)
+                        slope = between[0] * g_red + between[1] * g_green + between[2] * g_blue
+                        slope = (slope + opacity_between * g_opacity) / width
+                        # Beyond the stops nothing changes with t.
+                        slope = wp.cw_mul(slope, wp.min(STEEP * share, one))
+                        slope = wp.cw_mul(slope, wp.min(STEEP * (one - share), one))
+                        by_t = by_t + slope
+                        by_t_high = by_t_high + wp.cw_mul(share, slope)
+                    else:
+                        slope = chain_backward_column(
+                            g,
+                            shape,
+                            t,
+                            slot,
+                            x,
+                            paint_columns,
+                            stop_offsets_grad,
+                            stop_colors_grad,
+                            stop_opacities_grad,
+                        )
+                    if linear:
+                        by_u = by_u + slope
+                        u_by_u = u_by_u + wp.cw_mul(u, slope)
+                        v_by_u = v_by_u + wp.cw_mul(v, slope)
+                    else:
+                        slope = wp.cw_div(slope, wp.max(t, column(TINY)))
+                        to_u = wp.cw_mul(u, slope)
+                        to_v = wp.cw_mul(v, slope)
+                        by_u = by_u + to_u
+                        by_v = by_v + to_v
+                        u_by_u = u_by_u + wp.cw_mul(u, to_u)
+                        u_by_v = u_by_v + wp.cw_mul(u, to_v)
+                        v_by_u = v_by_u + wp.cw_mul(v, to_u)
+                        v_by_v = v_by_v + wp.cw_mul(v, to_v)
+        if case == RAMP:
+            high = wp.vec3(total(red_high), total(green_high), total(blue_high))
+            stop_colors_grad[first] = wp.vec3(total(red), total(green), total(blue)) - high
+            stop_colors_grad[first + 1] = high
+            stop_opacities_grad[first] = total(opacity) - total(opacity_high)
+            stop_opacities_grad[first + 1] = total(opacity_high)
+            stop_offsets_grad[first] = total(by_t_high) - total(by_t)
+            stop_offsets_grad[first + 1] = -total(by_t_high)
+        # A frame that moves shifts the points in unit space the other way.
+        origin = to_unit_adjoint(f, wp.vec2(-total(by_u), -total(by_v)))
+        along = to_unit_adjoint(f, wp.vec2(-total(u_by_u), -total(u_by_v)))
+        across = to_unit_adjoint(f, wp.vec2(-total(v_by_u), -total(v_by_v)))
+        frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
+
+    return backward
+
+
+CASES = (("ramp", RAMP), ("chain", CHAIN), ("gradient", GENERAL))
+FORWARD = [make_forward(f"{name}_forward", case) for name, case in CASES]
+BACKWARD = [*(make_backward(f"{name}_backward", case) for name, case in CASES[:2]), gradient_backward]
+
+
+@wp.kernel
+def tie_circles(
+    # In:
+    offset: wp.int32,
+    circular: wp.array[wp.int32],  # [shape_count] 1 where the frame is a circle's
+    # Out:
+    frames_grad: wp.array[frame],  # [shape_count] updated
+):
+    """Keep circles round: the second axis is the first one, turned by a right angle."""
+    i = offset + wp.tid()
+    if circular[i] == 1:
+        g = frames_grad[i]
+        x = g[2] + g[5]
+        y = g[3] - g[4]
+        frames_grad[i] = frame(g[0], g[1], x, y, -y, x)
