@@ -5,7 +5,9 @@ Each message is one line that names the thing and the cause.
 
 from __future__ import annotations
 
+import contextlib
 import errno
+from collections.abc import Iterator
 from enum import IntEnum
 
 
@@ -87,6 +89,15 @@ NO_MEMORY = (
 """Messages of Warp, CUDA, OpenCV, C++ and Python about a lack of resources, in lower case."""
 
 NO_RESOURCES = {errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE}
+
+
+@contextlib.contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Begin the messages of ``ImageError`` with a name."""
+    try:
+        yield
+    except ImageError as error:
+        raise ImageError(f"{name}: {error}") from error
 
 
 def shown(value: object) -> str:

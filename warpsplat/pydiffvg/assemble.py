@@ -8,7 +8,7 @@ import torch
 
 from warpsplat.pydiffvg.arguments import SceneArguments
 from warpsplat.pydiffvg.gather import Concatenate
-from warpsplat.pydiffvg.layout import Gradients, Layout
+from warpsplat.pydiffvg.layout import GradientTensors, Layout
 
 Tensor = torch.Tensor
 
@@ -46,7 +46,7 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     return values
 
 
-def _gradients(numbers: Tensor, gradients: Gradients, scale: Tensor) -> dict[str, Tensor]:
+def _gradients(numbers: Tensor, gradients: GradientTensors, scale: Tensor) -> dict[str, Tensor]:
     """Return frames and stops of gradients; ``scale``: canvas units -> pixels, shape (2,)."""
     first, second = numbers.index_select(0, gradients.points).view(-1, 2, 2).unbind(dim=1)
     axis = (second - first) * scale

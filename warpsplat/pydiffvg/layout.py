@@ -92,7 +92,7 @@ class Transforms(NamedTuple):
     row_group: Tensor
 
 
-class Gradients(NamedTuple):
+class GradientTensors(NamedTuple):
     """The gradients of the rows, as indices of their numbers."""
 
     points: Tensor
@@ -123,7 +123,7 @@ class Layout:
     """Indices of colours and opacities, constants for gradients; shape (4 x row,)."""
     widths: Tensor | None
     """Indices of half widths, 0 for fills, shape (row,); None: there are no strokes of one width."""
-    gradients: Gradients | None
+    gradients: GradientTensors | None
     spec: RenderSpec
     """Specification of the engine that renders the scene without premultiplying its colours."""
 
@@ -280,14 +280,14 @@ def _transforms(
     return Transforms(indices(entries, device), on(point_group, device), on(row_group, device))
 
 
-def _gradients(rows: list[Row], device: torch.device) -> Gradients:
+def _gradients(rows: list[Row], device: torch.device) -> GradientTensors:
     paints = [row.paint for row in rows]
     points = [4 * (ZERO,) if p.kind == Paint.FLAT else range(p.first, p.first + 4) for p in paints]
     offsets = [p.first + 4 + np.arange(p.stops) for p in paints]
     colors = [p.first + 4 + p.stops + np.arange(4 * p.stops) for p in paints]
     is_radial = np.array([[p.kind == Paint.RADIAL] for p in paints])
     each = [indices(parts, device) for parts in (points, offsets, colors)]
-    return Gradients(each[0], on(is_radial, device), *each[1:])
+    return GradientTensors(each[0], on(is_radial, device), *each[1:])
 
 
 def _scene(

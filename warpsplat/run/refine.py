@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, naming
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
@@ -29,7 +29,7 @@ from warpsplat.run.formats import write_named
 from warpsplat.run.memory import check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
-from warpsplat.run.svg import SvgSource, naming, svg_name_of, text_of
+from warpsplat.run.svg import SvgSource, svg_name_of, text_of
 from warpsplat.run.tracking import recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, naming
 from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import finest
@@ -88,15 +86,6 @@ def score(svg: SvgSource, image: ImageSource) -> Score:
     target, text = image_of(image), text_of(svg, name)
     with naming(name):
         return score_svg(text, target)
-
-
-@contextlib.contextmanager
-def naming(name: str) -> Iterator[None]:
-    """Begin the messages of ``ImageError`` with a name."""
-    try:
-        yield
-    except ImageError as error:
-        raise ImageError(f"{name}: {error}") from error
 
 
 def svg_name_of(svg: object) -> str:

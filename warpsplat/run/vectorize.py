@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, naming
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
@@ -27,7 +27,6 @@ from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
-from warpsplat.run.svg import naming
 from warpsplat.run.tracking import recorded, report_end, timed
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene

@@ -77,8 +77,8 @@ def digest() -> str:
         scenes.append(toured(scenes[-1]))
     found = hashlib.sha256()
     for scene in scenes:
-        for part in dataclasses.fields(scene):
-            value = getattr(scene, part.name)
+        for name in sorted(part.name for part in dataclasses.fields(scene)):
+            value = getattr(scene, name)
             if isinstance(value, np.ndarray):
                 found.update(value.tobytes())
     return found.hexdigest()[:16]
@@ -97,7 +97,7 @@ def old_processor() -> dict[str, str]:
 
 
 def test_the_same_bits_as_ever() -> None:
-    assert digest() == "746cd67e6eb10fb3"
+    assert digest() == "fde21c9de14232a1"
 
 
 def test_the_same_bits_as_on_an_old_processor() -> None:
