@@ -31,11 +31,7 @@ def pixels_of(target: FloatArray) -> int:
 
 
 def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
-    """Return whether a run measures SSIMULACRA2, if it is installed.
-
-    Up to ``QUICK_PIXELS`` it takes a twentieth of a run of the default effort, and much memory. Within a time
-    budget other things are worth more.
-    """
+    """Return whether a run measures SSIMULACRA2: within a time budget other things are worth more."""
     pixels = pixels_of(target)
     return (
         pixels <= QUICK_PIXELS
@@ -55,13 +51,13 @@ def scored(
 ) -> Score | None:
     """Return the score of a file; None if there is no time for it, or the run was stopped."""
     quick = pixels_of(target) <= QUICK_PIXELS
-    eyes = has_time_for_ssimulacra2(settings, target) and not interrupted
+    perceptual = has_time_for_ssimulacra2(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and run.stopped()):
         return None
     try:
         if reduction:
             return reduction.score(svg, target, run.stopped)
-        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else run.stopped)
+        return score_svg(svg, target, own=True, perceptual=perceptual, stop=None if quick else run.stopped)
     except Stopped:
         return None
 
@@ -76,7 +72,7 @@ def level_scores(
         if reduction:
             score = reduction.score(text, target, None)
         else:
-            score = score_svg(text, target, own=True, eyes=False)
+            score = score_svg(text, target, own=True, perceptual=False)
         found.append(LevelScore(end, score.as_dict()["psnr"]))
     return tuple(found)
 

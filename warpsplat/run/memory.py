@@ -55,7 +55,7 @@ FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
-SSIMULACRA2 = 500
+SSIMULACRA2 = 200
 """Bytes per pixel of measuring SSIMULACRA2."""
 
 REFINED = 40

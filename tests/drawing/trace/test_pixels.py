@@ -31,7 +31,7 @@ def test_nothing_is_lost(size: int) -> None:
     scene, per_pixel = trace_pixels(image)
     assert find_cells(image).size == size
     assert per_pixel == 1 / size
-    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False)
+    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, perceptual=False)
     assert score.psnr == np.inf
     assert score.paths == 4, "and the ground"
 
@@ -50,7 +50,7 @@ def test_what_is_empty_stays_empty() -> None:
     scene, per_pixel = trace_pixels(image)
     assert scene.canvas.background is None
     assert len(scene) == 4
-    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False).psnr == np.inf
+    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, perceptual=False).psnr == np.inf
 
 
 def test_a_background_of_its_own_needs_no_path() -> None:
