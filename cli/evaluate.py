@@ -25,9 +25,8 @@ def command(image: Path, svg: Path, **given: Any) -> None:
 
     The SVG is rendered at the image's size, on white; where the image has
     opacity, on black and on white, and the lower figures are given.
-    SSIMULACRA2 is given where its package is installed (the extra "eyes"),
-    for images of up to 4 million pixels. One of the two may be - for the
-    standard input.
+    SSIMULACRA2 is given for images of up to 4 million pixels. One of the
+    two may be - for the standard input.
     """
     import warpsplat
     from warpsplat.files.inputs import STANDARD, read_input

@@ -1,11 +1,8 @@
 from __future__ import annotations
 
-import sys
+import io
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -14,8 +11,9 @@ from PIL import Image
 
 from tests.scenes import random_scene
 from warpsplat.errors import Stopped
-from warpsplat.metrics import SSIMULACRA2_PIXELS, psnr, score_svg, similarities, ssimulacra2
+from warpsplat.metrics import psnr, score_svg, similarities
 from warpsplat.scene import Kind
+from warpsplat.ssimulacra2 import ssimulacra2
 from warpsplat.svg import viewer
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
@@ -101,7 +99,7 @@ def test_score_in_strips_is_that_of_whole_images(monkeypatch: pytest.MonkeyPatch
     for strip, whole, tolerance in cases:
         monkeypatch.setattr(viewer, "STRIP_PIXELS", strip)
         monkeypatch.setattr(viewer, "WHOLE_PIXELS", whole)
-        score = score_svg(text, target, eyes=False)
+        score = score_svg(text, target, perceptual=False)
         np.testing.assert_allclose([score.psnr, score.ssim, score.ms_ssim], want, atol=tolerance)
 
 
@@ -150,12 +148,12 @@ def test_scoring_can_be_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
         asked += 1
         return False
 
-    score_svg(text, target, eyes=False, stop=count)
+    score_svg(text, target, perceptual=False, stop=count)
     assert asked > 12
     for last in range(1, asked, 5):
         left = iter(range(last))
         with pytest.raises(Stopped):
-            score_svg(text, target, eyes=False, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
+            score_svg(text, target, perceptual=False, stop=lambda left=left: next(left, None) is None)  # type: ignore[misc]
 
 
 def test_memory_of_a_score_is_bounded() -> None:
@@ -164,54 +162,38 @@ def test_memory_of_a_score_is_bounded() -> None:
     target = np.zeros((1500, 2000, 3), np.float32)
     tracemalloc.start()
     try:
-        score_svg(text, target, eyes=False)
+        score_svg(text, target, perceptual=False)
         assert tracemalloc.get_traced_memory()[1] < 30 * 2000 * 1500
     finally:
         tracemalloc.stop()
 
 
-def test_ssimulacra2_is_that_of_the_package(tmp_path: Path) -> None:
-    """The package compares the SVG rendered on white with the image."""
+@pytest.mark.parametrize("shape", [(61, 43), (8, 9), (200, 130)])
+def test_ssimulacra2_is_that_of_its_package(shape: tuple[int, int]) -> None:
     package = pytest.importorskip("ssimulacra2")
+    rng = np.random.default_rng(0)
+    image = cv2.GaussianBlur(rng.integers(0, 256, (*shape, 3), np.uint8), (9, 9), 3)
+    noisy = np.clip(image + rng.normal(0, 12, image.shape), 0, 255).astype(np.uint8)
+    files = [io.BytesIO(), io.BytesIO()]
+    for file, pixels in zip(files, (image, noisy), strict=True):
+        Image.fromarray(pixels).save(file, "PPM")
+    assert ssimulacra2(image, noisy) == pytest.approx(package.compute_ssimulacra2(*files), abs=0.02)
+    assert ssimulacra2(image, image) == 100
+    assert ssimulacra2(image[:7], noisy[:7]) is None
+
+
+def test_ssimulacra2_is_measured_of_the_file_on_white() -> None:
     shape = '<circle cx="40" cy="30" r="25" fill="#c52" fill-opacity=".7"/>'
     text = f'<svg xmlns="http://www.w3.org/2000/svg" width="80" height="60">{shape}</svg>'
     image = np.round(on_white(render_svg(text))).astype(np.uint8)
     noisy = np.clip(image + np.random.default_rng(0).normal(0, 12, image.shape), 0, 255).astype(np.uint8)
-    for name, pixels in (("image", noisy), ("shown", image)):
-        Image.fromarray(pixels).save(tmp_path / f"{name}.png")
-    wanted = package.compute_ssimulacra2(str(tmp_path / "image.png"), str(tmp_path / "shown.png"))
-    score = score_svg(text, (noisy / 255).astype(np.float32))
-    assert score.ssimulacra2 == pytest.approx(wanted, abs=1e-9)
-    assert score.as_dict()["ssimulacra2"] == round(wanted, 2)
-    assert wanted < 90
-    assert ssimulacra2(image, image) == 100
-
-
-def test_ssimulacra2_has_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package of our own: it is asked for images of neither too few nor too many pixels, image first."""
-    asked: list[list[Any]] = []
-
-    def compute(*files: Any) -> float:
-        asked.append([np.asarray(Image.open(file)) for file in files])
-        return -7.123
-
-    monkeypatch.setitem(sys.modules, "ssimulacra2", SimpleNamespace(compute_ssimulacra2=compute))
-    wide = SSIMULACRA2_PIXELS // 8 + 1
-    for shape in ((7, 20, 3), (20, 7, 3), (8, wide, 3)):
-        assert ssimulacra2(np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)) is None
-    assert not asked
-    a, b = np.random.default_rng(0).integers(0, 256, (2, 8, 9, 3), np.uint8)
-    assert ssimulacra2(a, b) == -7.123
-    np.testing.assert_array_equal(asked[0], [a, b])
-
-
-def test_without_the_package_ssimulacra2_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ssimulacra2", None)  # makes importing it fail
-    text = write_svg(random_scene(Kind.FILL, count=5))
-    score = score_svg(text, (on_white(render_svg(text)) / 255).astype(np.float32))
-    assert score.ssimulacra2 is None
-    assert score.as_dict()["ssimulacra2"] is None
-    assert score.psnr > 60
+    target = (noisy / 255).astype(np.float32)
+    figure = ssimulacra2(noisy, image)
+    assert figure is not None and figure < 90
+    score = score_svg(text, target)
+    assert score.ssimulacra2 == figure
+    assert score.as_dict()["ssimulacra2"] == round(figure, 2)
+    assert score_svg(text, target, perceptual=False).ssimulacra2 is None
 
 
 @pytest.mark.parametrize("size", [(64, 48), (65, 48), (64, 49)])
@@ -226,10 +208,10 @@ def test_strips_make_the_figures_of_the_whole(
     if channels == 4:
         target[..., :3] *= target[..., 3:]
     text = write_svg(random_scene(Kind.FILL, 5, width=width, height=height, seed=1))
-    whole = score_svg(text, target, own=True, eyes=False)
+    whole = score_svg(text, target, own=True, perceptual=False)
     monkeypatch.setattr("warpsplat.metrics.WHOLE_PIXELS", 0)
     monkeypatch.setattr("warpsplat.metrics.STRIP_PIXELS", 640)
     monkeypatch.setattr(viewer, "STRIP_PIXELS", 640)
-    pieces = score_svg(text, target, own=True, eyes=False)
+    pieces = score_svg(text, target, own=True, perceptual=False)
     for name, value in whole.as_dict().items():
         assert pieces.as_dict()[name] == pytest.approx(value, abs=1e-6), name

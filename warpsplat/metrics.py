@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import gzip
-import io
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
@@ -12,9 +11,9 @@ from typing import Any, Protocol
 import cv2
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from warpsplat.portable import elementary
+from warpsplat.ssimulacra2 import ssimulacra2
 from warpsplat.svg.inspect import inspect_svg
 from warpsplat.svg.viewer import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
@@ -28,11 +27,8 @@ MIDDLE = np.float32(128)
 MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Weights of the five scales (Wang et al. 2003, section 3.2)."""
 
-SSIMULACRA2_SIDE = 8
-"""Smallest side of an image that SSIMULACRA2 is defined for [px]."""
-
 SSIMULACRA2_PIXELS = 4_000_000
-"""Largest image that it is measured for [pixels]: its package takes 500 bytes and 3 microseconds a pixel."""
+"""Largest image that SSIMULACRA2 is measured for [pixels]: it takes 200 bytes a pixel."""
 
 
 class Rows(Protocol):
@@ -161,30 +157,6 @@ def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
     return float((luminance * contrast).sum(dtype=np.float64)), float(contrast.sum(dtype=np.float64))
 
 
-def ssimulacra2(a: Bytes, b: Bytes) -> float | None:
-    """Return SSIMULACRA2 (Sneyers, Cloudinary 2022) of ``b`` against ``a``, sRGB of shape (height, width, 3).
-
-    100: equal; 90: no visible difference; 50: an obvious one; below 0: a caricature. None: its package (the
-    extra ``eyes``) is not installed, or the image is too small or large.
-    """
-    height, width = a.shape[:2]
-    if min(height, width) < SSIMULACRA2_SIDE or height * width > SSIMULACRA2_PIXELS:
-        return None
-    try:
-        from ssimulacra2 import compute_ssimulacra2  # takes half a second
-    except ImportError:
-        return None
-    return float(compute_ssimulacra2(_as_file(a), _as_file(b)))
-
-
-def _as_file(pixels: Bytes) -> io.BytesIO:
-    """Return 8-bit sRGB as a file for Pillow."""
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "PPM")
-    file.seek(0)
-    return file
-
-
 @dataclass(frozen=True)
 class Score:
     """Figures of a file compared with its image."""
@@ -194,7 +166,7 @@ class Score:
     ssim: float | None
     ms_ssim: float | None
     ssimulacra2: float | None
-    """None: it was not measured."""
+    """None: it was not measured, or the image is too small."""
     paths: int
     """As ``SvgFacts.paths``."""
     nodes: int
@@ -221,20 +193,20 @@ def score_svg(
     target: Rows,
     *,
     own: bool = False,
-    eyes: bool = True,
+    perceptual: bool = True,
     stop: Callable[[], bool] | None = None,
 ) -> Score:
     """Render ``text`` at the size of ``target`` and compare.
 
     With opacity they are compared on black and on white, and the figures are of where they differ more.
-    Besides ``target`` this takes about 6 bytes a pixel (12 if a side is odd), with SSIMULACRA2 500.
+    Besides ``target`` this takes about 6 bytes a pixel (12 if a side is odd), with SSIMULACRA2 200.
 
     Args:
         text: The SVG.
         target: The image, sRGB in [0, 1], shape (height, width, 3), for which transparent parts of the file
             are white; or premultiplied with opacity, shape (height, width, 4).
         own: Whether this program wrote the text just now, so that it is drawn without precautions.
-        eyes: Whether to measure SSIMULACRA2 if possible.
+        perceptual: Whether to measure SSIMULACRA2, of images that are neither too small nor too large.
         stop: Called every few tenths of a second; once true, the work is given up.
 
     Raises:
@@ -248,7 +220,8 @@ def score_svg(
         paper = max((0, 255), key=lambda level: _error(shown, target, level))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check_stop(stop)
-    seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if eyes else None
+    perceptual = perceptual and height * width <= SSIMULACRA2_PIXELS
+    seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if perceptual else None
     facts = inspect_svg(text)
     return Score(
         psnr=fidelity,

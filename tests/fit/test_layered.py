@@ -82,7 +82,7 @@ def test_each_level_is_a_picture(device: str) -> None:
 def test_hiding_groups_leaves_the_simpler_picture(device: str) -> None:
     result = vectorize(picture(), make_settings(levels=(5, 20), iterations=40), Backend.on(device))
     first, _ = result.svg.split('</g><g id="level-20">')
-    score = score_svg(first + "</g></svg>", picture(), own=True, eyes=False)
+    score = score_svg(first + "</g></svg>", picture(), own=True, perceptual=False)
     assert score.psnr == pytest.approx(result.levels[0].psnr, abs=0.02)
 
 

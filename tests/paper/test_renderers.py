@@ -87,7 +87,7 @@ def test_figures_of_the_render_and_of_the_file_have_their_own_names(device: str)
     settings = make_settings(curves=30, iterations=40, renderer="splat")
     result = vectorize(picture(), settings, Backend.on(device))
     values = result.as_dict()
-    assert values["psnr"] == round(score_svg(result.svg, picture(), eyes=False).psnr, 3)
+    assert values["psnr"] == round(score_svg(result.svg, picture(), perceptual=False).psnr, 3)
     # After its last step the numbers are rounded for the file: 0.01 to 0.04 dB over five seeds.
     splats, _ = render_figures(result.scene, picture(), settings, Backend.on(device))
     assert values["render_psnr"] == pytest.approx(splats, abs=0.2)

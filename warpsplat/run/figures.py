@@ -25,11 +25,7 @@ takes about a second."""
 
 
 def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
-    """Return whether a run measures SSIMULACRA2, if it is installed.
-
-    Up to ``QUICK_PIXELS`` it takes a twentieth of a run of the default effort, and much memory. Within a time
-    budget other things are worth more.
-    """
+    """Return whether a run measures SSIMULACRA2: within a time budget other things are worth more."""
     pixels, limit = target[..., 0].size, memory_limit(settings)
     has_memory = limit is None or PROGRAM + (SSIMULACRA2 + 16) * pixels <= limit
     return pixels <= QUICK_PIXELS and settings.time_budget is None and has_memory
@@ -46,13 +42,13 @@ def scored(
 ) -> Score | None:
     """Return the score of a file; None if there is no time for it, or the run was stopped."""
     quick = target[..., 0].size <= QUICK_PIXELS
-    eyes = has_time_for_ssimulacra2(settings, target) and not interrupted
+    perceptual = has_time_for_ssimulacra2(settings, target) and not interrupted
     if (interrupted and not quick) or (not interrupted and run.stopped()):
         return None
     try:
         if reduction:
             return reduction.score(svg, target, run.stopped)
-        return score_svg(svg, target, own=True, eyes=eyes, stop=None if quick else run.stopped)
+        return score_svg(svg, target, own=True, perceptual=perceptual, stop=None if quick else run.stopped)
     except Stopped:
         return None
 
@@ -67,7 +63,7 @@ def level_scores(
         if reduction:
             score = reduction.score(text, target, None)
         else:
-            score = score_svg(text, target, own=True, eyes=False)
+            score = score_svg(text, target, own=True, perceptual=False)
         found.append(LevelScore(end, score.as_dict()["psnr"]))
     return tuple(found)
 

@@ -62,7 +62,7 @@ FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
 """Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
-SSIMULACRA2 = 500
+SSIMULACRA2 = 200
 """Bytes per pixel of measuring SSIMULACRA2."""
 
 REFINED = 40
@@ -239,11 +239,11 @@ class Reduction:
     def score(self, svg: str, target: FloatArray, stop: Callable[[], bool] | None) -> Score:
         """Score the file against the image itself, else against the reduced one (``target``)."""
         if self.whole:
-            return score_svg(svg, self.whole(), own=True, eyes=False, stop=stop)
+            return score_svg(svg, self.whole(), own=True, perceptual=False, stop=stop)
         # Only pixels whose squares lie within the image.
         wide, tall = self.width // self.factor, self.height // self.factor
         small = resized(svg, wide, tall, 1 / self.factor)
-        return score_svg(small, target[:tall, :wide], own=True, eyes=False, stop=stop).of_file(svg)
+        return score_svg(small, target[:tall, :wide], own=True, perceptual=False, stop=stop).of_file(svg)
 
     def words(self) -> str:
         """Return a message about the reduction."""

@@ -120,7 +120,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         text = with_view(text, view, *problem.size)
     base, target, has_background = _load(text, problem, name, keep=keep)
     scene = base.scene
-    before = score_svg(text, target, eyes=False)
+    before = score_svg(text, target, perceptual=False)
     settings = _settings(problem.settings, len(scene))
     made = fit(Problem(target, settings), run, Start(scene=scene))
     if checkpoint and made.interrupted:
@@ -133,10 +133,10 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
     svg = minified(svg) if settings.minify else svg if view else shortened(svg)
-    eyes = has_time_for_ssimulacra2(settings, target) and not made.interrupted
-    score = score_svg(svg, target, own=not scene.pictures, eyes=eyes)
+    perceptual = has_time_for_ssimulacra2(settings, target) and not made.interrupted
+    score = score_svg(svg, target, own=not scene.pictures, perceptual=perceptual)
     better = score.psnr > before.psnr
-    if eyes and not better:
+    if perceptual and not better:
         before = score_svg(text, target)
     if view:
         svg = on_sheet_of(given, view, svg)

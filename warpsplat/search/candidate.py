@@ -74,7 +74,7 @@ def measured(problem: Problem, made: Fit) -> Candidate:
     """Write and score the file of a fit, its shapes in the order that makes it small."""
     made = replace(made, scene=made.scene.take(by_opacity(made.scene)))
     text = finished(made.scene, problem.settings, made.per_pixel, problem.metadata)
-    score = score_svg(text, problem.target, own=True, eyes=False)
+    score = score_svg(text, problem.target, own=True, perceptual=False)
     return Candidate(made, score.bytes, score.psnr)
 
 

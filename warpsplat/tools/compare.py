@@ -132,7 +132,7 @@ def their_row(
         return ComparisonRow(image, tracer.name, setting, "", *elapsed(), None, message)
     times = elapsed()
     try:
-        score = score_svg(svg, target, eyes=with_ssimulacra2)
+        score = score_svg(svg, target, perceptual=with_ssimulacra2)
     except ImageError as error:
         return ComparisonRow(image, tracer.name, setting, svg, *times, None, f"its file: {error}")
     return ComparisonRow(image, tracer.name, setting, svg, *times, score)

@@ -32,7 +32,6 @@ EXTRAS = {
     "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
     "pdf": ("typst", "outputs that end in .pdf"),
     "video": ("av", "animations that end in .mp4"),
-    "eyes": ("ssimulacra2", "SSIMULACRA2 in reports"),
     "compare": ("vtracer", "warpsplat compare"),
     "ray": ("ray", "warpsplat batch --executor ray"),
     "serve": ("starlette", "warpsplat serve"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpsplat.drawing.trace import pixels
-from warpsplat.drawing.trace.pixels import find_cells, outlines, trace_pixels
+from warpsplat.drawing.trace.pixels import outlines, trace_pixels
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray
@@ -29,9 +29,8 @@ def enlarged(image: FloatArray, size: int) -> FloatArray:
 def test_nothing_is_lost(size: int) -> None:
     image = enlarged(noise(16, 5), size)
     scene, per_pixel = trace_pixels(image)
-    assert find_cells(image).size == size
     assert per_pixel == 1 / size
-    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False)
+    score = score_svg(write_svg(scene, per_pixel=per_pixel), image, perceptual=False)
     assert score.psnr == np.inf
     assert score.paths == 4, "and the ground"
 
@@ -50,7 +49,7 @@ def test_what_is_empty_stays_empty() -> None:
     scene, per_pixel = trace_pixels(image)
     assert scene.canvas.background is None
     assert len(scene) == 4
-    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, eyes=False).psnr == np.inf
+    assert score_svg(write_svg(scene, per_pixel=per_pixel), image, perceptual=False).psnr == np.inf
 
 
 def test_a_background_of_its_own_needs_no_path() -> None:
@@ -85,7 +84,7 @@ def test_cells_that_touch_by_a_corner_are_apart() -> None:
 
 def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pixels, "MOST_CELLS", 100)
-    with pytest.raises(ImageError, match="16x16 cells of 2 px, more than pixel art may have"):
+    with pytest.raises(ImageError, match="16x16 cells, more than pixel art may have"):
         trace_pixels(enlarged(noise(16, 3), 2))
 
 

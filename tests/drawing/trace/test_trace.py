@@ -17,7 +17,7 @@ from warpsplat.svg.write import write_svg
 
 
 def decibels(traced: Traced, image: FloatArray) -> float:
-    return score_svg(write_svg(traced.scene), image, eyes=False).psnr
+    return score_svg(write_svg(traced.scene), image, perceptual=False).psnr
 
 
 def hex_colors(traced: Traced) -> list[str]:

@@ -72,7 +72,7 @@ def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
 def _measured(task: Task, data: bytes) -> Outcome:
     """Measure a result that exists."""
     svg = svg_text(data, task.output)
-    score = score_svg(svg, load_target(task.image, task.name, task.settings.background), eyes=False)
+    score = score_svg(svg, load_target(task.image, task.name, task.settings.background), perceptual=False)
     outcome = Outcome(task.number, "measured", task.key, data, score.as_dict())
     if not task.report_back:
         return outcome

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.lattice import MOST_COLORS, Lattice, find_lattice
 from warpsplat.errors import ImageError
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
 from warpsplat.scene.scene import starts_of
@@ -22,6 +23,8 @@ Point = tuple[int, int]
 STRIP_ROWS = 64  # compared at once, which bounds the memory
 MOST_CORNERS = 32_000  # of a shape
 SAME = 0.5 / 255  # difference below which colours are one in 8 bits
+FINE = 0.25  # [px] that the borders of cells are rounded to
+SAME_SIDE = 0.002  # largest share that one side of a cell may be longer
 
 
 @dataclass(frozen=True)
@@ -32,12 +35,16 @@ class PixelArt:
     """Number of each cell's colour, shape (row, column)."""
     palette: Floats
     """sRGB in [0, 1] of each colour, and its opacity if there is one; shape (color, 3 or 4)."""
-    size: int
-    """Side of a cell [px]."""
+    across: Floats | Ints
+    """Borders of the columns [px], shape (column + 1,)."""
+    down: Floats | Ints
+    """Borders of the rows [px], shape (row + 1,)."""
+    per_pixel: float
+    """Units per pixel in which all borders are whole numbers."""
 
 
 def find_cells(image: FloatArray) -> PixelArt:
-    """Return the largest cells that each have one colour.
+    """Return the cells of pixel art: exactly, or with noise and soft borders removed if there is a lattice.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
@@ -47,30 +54,58 @@ def find_cells(image: FloatArray) -> PixelArt:
     """
     shown = np.concatenate([straight(image), image[..., 3:]], axis=2)
     levels = np.round(shown * 255).astype(np.uint8)  # the colours of a file have 8 bits
-    size = cell_size(levels)
-    cells = levels[::size, ::size]
+    across, down = changes(levels)
+    size = int(np.gcd.reduce(np.concatenate([across, down])))
+    cells = levels[down[:-1, None], across[:-1]]
+    palette, colors = np.unique(cells.reshape(-1, image.shape[2]), axis=0, return_inverse=True)
+    if size == 1 and len(palette) > MOST_COLORS:
+        lattice = find_lattice(levels)
+        if lattice:
+            return _of_lattice(lattice, levels.shape[1], levels.shape[0])
     if cells.shape[0] * cells.shape[1] > MOST_CELLS:
         shape = f"{cells.shape[1]}x{cells.shape[0]}"
-        raise ImageError(f"{shape} cells of {size} px, more than pixel art may have ({MOST_CELLS})")
-    palette, colors = np.unique(cells.reshape(-1, image.shape[2]), axis=0, return_inverse=True)
-    return PixelArt(colors.reshape(cells.shape[:2]), np.asarray(palette / 255, np.float32), size)
+        raise ImageError(f"{shape} cells, more than pixel art may have ({MOST_CELLS})")
+    return PixelArt(colors.reshape(cells.shape[:2]), _shares(palette), across, down, 1 / size)
 
 
-def cell_size(image: npt.NDArray[Any], converted: Callable[..., npt.NDArray[Any]] = np.asarray) -> int:
-    """Return the side of the largest cells of one colour each that make up an image [px].
+def _of_lattice(lattice: Lattice, width: int, height: int) -> PixelArt:
+    """Return the cells of a lattice: in units of a cell if the image begins with one, else of ``FINE`` px."""
+    columns, rows = lattice.columns, lattice.rows
+    is_aligned = columns.origin == rows.origin == 0 and abs(columns.period / rows.period - 1) < SAME_SIDE
+    per_pixel = 1 / columns.period if is_aligned else 1 / FINE
+    across, down = columns.borders(width), rows.borders(height)
+    if is_aligned:
+        down = np.round(down * per_pixel) / per_pixel
+    return PixelArt(lattice.colors, _shares(lattice.palette), across, down, per_pixel)
+
+
+def _shares(levels: Ints) -> FloatArray:
+    """Return 8-bit levels as numbers in [0, 1]."""
+    return np.asarray(levels / 255, np.float32)
+
+
+def changes(
+    image: npt.NDArray[Any], converted: Callable[..., npt.NDArray[Any]] = np.asarray
+) -> tuple[Ints, Ints]:
+    """Return where the columns, and the rows, of an image differ from those before, its borders included.
 
     Args:
         image: Shape (height, width, channel).
         converted: Applied to strips of it before they are compared.
     """
     height, width = image.shape[:2]
-    across, down = np.zeros(width - 1, np.bool_), np.zeros(height - 1, np.bool_)
+    across, down = np.ones(width + 1, np.bool_), np.ones(height + 1, np.bool_)
+    across[1:-1] = False
     for top in range(0, height, STRIP_ROWS):
         strip = converted(image[top : top + STRIP_ROWS + 1])
-        across |= (np.diff(strip, axis=1) != 0).any(axis=(0, 2))
-        down[top : top + STRIP_ROWS] = (np.diff(strip, axis=0) != 0).any(axis=(1, 2))
-    borders = np.concatenate([np.flatnonzero(across) + 1, np.flatnonzero(down) + 1, [width, height]])
-    return int(np.gcd.reduce(borders))
+        across[1:-1] |= (strip[:, 1:] != strip[:, :-1]).any(axis=(0, 2))
+        down[top + 1 : top + len(strip)] = (strip[1:] != strip[:-1]).any(axis=(1, 2))
+    return np.flatnonzero(across), np.flatnonzero(down)
+
+
+def cell_size(image: npt.NDArray[Any]) -> int:
+    """Return the side of the largest cells of one colour each that make up an image [px]."""
+    return int(np.gcd.reduce(np.concatenate(changes(image))))
 
 
 def outlines(inside: Bools) -> list[list[Point]]:
@@ -136,9 +171,10 @@ def polygons(inside: Bools) -> list[list[list[Point]]]:
     ]
 
 
-def _lines(corners: list[Point], size: int) -> Floats:
+def _lines(corners: list[Point], cells: PixelArt) -> Floats:
     """Return a polygon as a ring of cubics, with handles at the thirds of its lines."""
-    start = np.asarray(corners, np.float64) * size
+    columns, rows = np.asarray(corners).T
+    start = np.stack([cells.across[columns], cells.down[rows]], axis=1)
     way = np.roll(start, -1, axis=0) - start
     return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)
 
@@ -169,7 +205,7 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
     else:
         seen = (np.abs(cells.palette - background) > SAME).any(axis=1)
     shown = [(i, rings) for i in np.flatnonzero(seen).tolist() for rings in sets[i]]
-    contours = [[_lines(ring, cells.size) for ring in rings] for _, rings in shown]
+    contours = [[_lines(ring, cells) for ring in rings] for _, rings in shown]
     palette = np.asarray(cells.palette[[i for i, _ in shown]], np.float32)
     flat = list(itertools.chain.from_iterable(contours))
     count = len(contours)
@@ -187,4 +223,4 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         opacities=np.ones(count, np.float32) if is_opaque else palette[:, 3],
         rule=np.full(count, Rule.EVENODD, np.int32),
     )
-    return scene, 1 / cells.size
+    return scene, cells.per_pixel

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth, dilated
-from warpsplat.drawing.trace.pixels import cell_size
+from warpsplat.drawing.trace.lattice import CELLS, MOST_COLORS, find_lattice
+from warpsplat.drawing.trace.pixels import changes
 from warpsplat.portable.sequences import convolve
 from warpsplat.scene import FloatArray
 
@@ -58,9 +59,9 @@ def _guess(image: FloatArray) -> Guess:
     top, left = max(0, height - LARGEST) // 2, max(0, width - LARGEST) // 2
     part = _levels(image[top : top + LARGEST, left : left + LARGEST])
     colors, counts = _colors(part)
-    cell = _cell(image, counts)
-    if cell is not None:
-        return Guess("pixel", f"{len(counts)} colours in cells of {cell}x{cell} px")
+    cells = _cells(image, counts)
+    if cells is not None:
+        return Guess("pixel", cells)
     step = _step(part)
     edges = step > EDGE
     share = (step > 2 * EDGE).mean()
@@ -72,7 +73,7 @@ def _guess(image: FloatArray) -> Guess:
     beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
         few = _few_colors(part, np.zeros_like(edges), blurs=2)
-        why = f"{few:.0%} of the pixels, without their grain, have one of {MOST_COLORS} colours"
+        why = f"{few:.0%} of the pixels, without their grain, have one of {FLAT_COLORS} colours"
         return Guess("drawing" if few >= FEW_IN_GRAIN else "photo", why)
     evenness = _evenness(part, step, ~paper & ~beside)
     is_even = f"{evenness:.0%} of the pixels away from edges are even"
@@ -80,7 +81,7 @@ def _guess(image: FloatArray) -> Guess:
         return Guess("drawing", is_even)
     few = _few_colors(part, edges, blurs=1)
     if few >= FEW:
-        return Guess("drawing", f"{few:.0%} of the pixels away from edges have one of {MOST_COLORS} colours")
+        return Guess("drawing", f"{few:.0%} of the pixels away from edges have one of {FLAT_COLORS} colours")
     return Guess("photo", is_even)
 
 
@@ -110,26 +111,32 @@ def _step(levels: Ints) -> Ints:
     return step
 
 
-CELLS = (8, 256)  # fewest and most cells on a side of pixel art
-PIXEL_COLORS = 64  # of pixel art, at the most
 SPRITE = 128  # [px] longer side of an image whose pixels may each be a cell
 FREQUENT, FREQUENT_PIXELS = 0.002, 3  # share of the pixels, and pixels, of a colour that is no antialiasing
 MOSTLY_FREQUENT = 0.97  # least share of the pixels in such colours
+REPEATED = 0.3  # least share of columns, and of rows, like the one before in pixel art that was enlarged
 
 
-def _cell(image: FloatArray, counts: Ints) -> int | None:
-    """Return the side of the cells of pixel art [px]; None for other images. ``counts``: of its colours."""
-    height, width = image.shape[:2]
-    if not 2 <= len(counts) <= PIXEL_COLORS:
+def _cells(image: FloatArray, counts: Ints) -> str | None:
+    """Return what the cells of pixel art are like; None for other images. ``counts``: of its colours."""
+    if 2 <= len(counts) <= MOST_COLORS:
+        across, down = changes(image, _levels)
+        cell = int(np.gcd.reduce(np.concatenate([across, down])))
+        if cell > 1:
+            cells = image.shape[0] // cell, image.shape[1] // cell
+            is_art = CELLS[0] <= min(cells) and max(cells) <= CELLS[1]
+            return f"{len(counts)} colours in cells of {cell}x{cell} px" if is_art else None
+        frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
+        size = np.array(image.shape[:2])
+        is_small = size.max() <= SPRITE
+        is_scaled = (1 - (np.array([len(down), len(across)]) - 2) / size).min() > REPEATED
+        is_plain = frequent >= MOSTLY_FREQUENT * counts.sum()
+        if (is_small or is_scaled) and is_plain and not _is_antialiased(_levels(image)):
+            return f"{len(counts)} colours with hard edges"
+    lattice = find_lattice(_levels(image).astype(np.uint8))
+    if lattice is None:
         return None
-    cell = cell_size(image, _levels)
-    across, down = width // cell, height // cell
-    if cell > 1:
-        return cell if CELLS[0] <= min(across, down) and max(across, down) <= CELLS[1] else None
-    frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * width * height)].sum()
-    if max(width, height) > SPRITE or frequent < MOSTLY_FREQUENT * width * height:
-        return None
-    return None if _is_antialiased(_levels(image)) else 1
+    return f"{lattice.colors.shape[1]}x{lattice.colors.shape[0]} cells of {lattice.columns.period:.3g} px"
 
 
 MIXED = 0.2  # share of mixtures among the pixels at edges from which on an image is antialiased
@@ -187,7 +194,7 @@ def _evenness(levels: Ints, step: Ints, rest: Bools) -> float:
     return float(max((step[rest] <= 1).mean(), (bend[rest] <= 1).mean()))
 
 
-MOST_COLORS = 10
+FLAT_COLORS = 10
 SAMPLES = 60_000  # pixels in which colours are counted
 NEAR_COLOR = 6  # [levels] distance of a pixel from a colour that it counts as
 
@@ -203,7 +210,7 @@ def _few_colors(levels: Ints, edges: Bools, blurs: int) -> float:
     rest: Floats = calm[~edges].astype(np.float32)
     rest = rest[:: max(1, len(rest) // SAMPLES)]
     total = len(rest)
-    for _ in range(MOST_COLORS):
+    for _ in range(FLAT_COLORS):
         if not len(rest):
             break
         key = np.zeros(len(rest), np.int64)

@@ -1,0 +1,110 @@
+"""Enlarged pixel art: its cells are found whatever the scale, the margin, the interpolation and the noise."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+
+from tests.drawing.trace.drawings import photograph
+from warpsplat.drawing.trace.lattice import find_lattice
+from warpsplat.drawing.trace.pixels import trace_pixels
+from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.metrics import score_svg
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
+
+Levels = npt.NDArray[Any]
+
+
+def sprite(side: int = 16) -> Levels:
+    """A symmetric figure of five colours on white."""
+    rng = np.random.default_rng(3)
+    half = rng.integers(1, 6, (side, side // 2))
+    colors = np.concatenate([half, half[:, ::-1]], axis=1)
+    y, x = np.mgrid[:side, :side] - (side - 1) / 2
+    colors[np.hypot(x, y) > 0.45 * side] = 0
+    palette = np.array(
+        [[255] * 3, [30, 30, 40], [200, 60, 50], [240, 200, 80], [60, 140, 90], [70, 110, 200]]
+    )
+    return palette[colors].astype(np.uint8)
+
+
+def scaled(image: Levels, scale: float, how: Image.Resampling = Image.Resampling.NEAREST) -> Levels:
+    size = round(image.shape[1] * scale), round(image.shape[0] * scale)
+    return np.array(Image.fromarray(image).resize(size, how))
+
+
+def jpeg(image: Levels, quality: int) -> Levels:
+    file = io.BytesIO()
+    Image.fromarray(image).save(file, "JPEG", quality=quality)
+    return np.array(Image.open(file))
+
+
+def bordered(image: Levels, left: int, top: int) -> Levels:
+    return np.asarray(cv2.copyMakeBorder(image, top, 3, left, 5, cv2.BORDER_CONSTANT, value=(255, 255, 255)))
+
+
+NOISY = {
+    "JPEG": jpeg(scaled(sprite(), 4), 90),
+    "strong JPEG": jpeg(scaled(sprite(), 6), 75),
+    "broken scale, JPEG": jpeg(scaled(sprite(), 5.3), 85),
+    "margin, JPEG": jpeg(bordered(scaled(sprite(), 6), 7, 9), 85),
+    "interpolated": scaled(sprite(), 4, Image.Resampling.BILINEAR),
+    "broken scale, interpolated": scaled(sprite(), 4.3, Image.Resampling.BILINEAR),
+}
+CLEAN = {
+    "broken scale": scaled(sprite(), 1.5),
+    "margin": bordered(scaled(sprite(), 4), 7, 9),
+    "cropped": scaled(sprite(), 4)[2:-3, 1:-2],
+}
+
+
+def cropped(colors: Levels) -> npt.NDArray[np.int64]:
+    """Without the white around."""
+    seen = colors.min(axis=2) < 200
+    rows, columns = np.flatnonzero(seen.max(axis=1)), np.flatnonzero(seen.max(axis=0))
+    return colors[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.int64)
+
+
+@pytest.mark.parametrize("name", NOISY)
+def test_noisy_cells_are_those_before(name: str) -> None:
+    lattice = find_lattice(NOISY[name])
+    assert lattice is not None
+    found, wanted = cropped(lattice.palette[lattice.colors]), cropped(sprite())
+    assert found.shape == wanted.shape
+    assert (np.abs(found - wanted).max(axis=2) <= 12).mean() > 0.97
+    assert len(lattice.palette) <= 8
+
+
+@pytest.mark.parametrize("name", [*NOISY, *CLEAN])
+def test_enlarged_cells_are_pixel_art(name: str) -> None:
+    image = (NOISY | CLEAN)[name].astype(np.float32) / 255
+    assert guess_subject(image).subject == "pixel"
+    scene, per_pixel = trace_pixels(image)
+    text = write_svg(scene, per_pixel=per_pixel)
+    score = score_svg(text, image)
+    assert score.paths <= 8
+    if name in CLEAN:
+        assert score.psnr == np.inf
+    elif "interpolated" not in name:
+        assert score.psnr > 20
+        # Each cell has one colour.
+        assert len(np.unique(on_white(render_svg(text)).reshape(-1, 3), axis=0)) <= 8
+
+
+def test_other_images_have_no_cells() -> None:
+    disc = cv2.circle(np.full((96, 96, 3), 255, np.uint8), (48, 48), 30, (200, 30, 30), -1, cv2.LINE_AA)
+    dots = np.full((96, 96, 3), 255, np.uint8)
+    for y in range(8, 96, 12):
+        for x in range(8, 96, 12):
+            cv2.circle(dots, (x, y), 4, (30, 30, 200), -1, cv2.LINE_AA)
+    photo = np.round(photograph() * 255).astype(np.uint8)
+    small = cv2.resize(photo, (24, 24), interpolation=cv2.INTER_AREA)
+    images = (disc, dots, photo, jpeg(photo, 75), scaled(small, 4, Image.Resampling.BILINEAR))
+    assert [find_lattice(image) for image in images] == [None] * len(images)
