@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -42,6 +43,38 @@ def grainy(image: FloatArray, levels: float = 13.0) -> FloatArray:
     return (np.clip(np.round(255 * image + noise), 0, 255) / 255).astype(np.float32)
 
 
+def small_grey(side: int) -> FloatArray:
+    small = cv2.resize(photograph(192), (side, side), interpolation=cv2.INTER_AREA)
+    return np.repeat(small.mean(axis=2, keepdims=True), 3, axis=2).astype(np.float32)
+
+
+def icon(side: int) -> FloatArray:
+    """A cross in a ring, a quarter of whose pixels are edges."""
+    text = '<circle cx="16" cy="16" r="12"/><path d="M8 16H24M16 8V24"/>'
+    return draw(
+        ground("#fff", side, side) + f'<g fill="none" stroke="#c22" stroke-width="2">{text}</g>', side, side
+    )
+
+
+def letters() -> FloatArray:
+    """Lines of strokes of a pixel and a half, 12 px high."""
+    strokes = "".join(f"M{4 + 6 * i} {4 + i % 3}v{10 - 2 * (i % 4)}h{2 + i % 3}" for i in range(30))
+    return draw(
+        ground("#fff", 190, 20) + f'<path d="{strokes}" fill="none" stroke="#111" stroke-width="1.5"/>',
+        190,
+        20,
+    )
+
+
+def discs() -> FloatArray:
+    """Without antialiasing: rows and columns between them are alike, but these are no cells."""
+    image = np.ones((160, 200, 3), np.float32)
+    for i in range(8):
+        center = (25 + 45 * (i % 4), 40 + 80 * (i // 4))
+        cv2.circle(image, center, 15 + i, (0.1 * i, 0.5, 0.9), -1)
+    return image
+
+
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -53,6 +86,10 @@ PICTURES = {
     "grainy logo": (grainy(draw(BARS, 192, 192)), "drawing"),
     "grainy photograph": (grainy(0.2 + 0.6 * photograph(192)), "photo"),
     "dithered": (dithered(160), "photo"),
+    "small grey photograph": (small_grey(48), "photo"),
+    "small icon": (icon(32), "drawing"),
+    "small letters": (letters(), "drawing"),
+    "hard discs": (discs(), "drawing"),
     "code": (cells(25, 4, 2), "pixel"),
     "sprite": (cells(32, 1, 6), "pixel"),
 }

@@ -46,6 +46,11 @@ def guess_subject(image: FloatArray) -> Guess:
 LARGEST = 1024  # [px] side of the part in the middle of an image that is inspected
 EDGE = 24  # [levels] step between neighbours from which on there is an edge
 DITHERED = 0.25  # share of pixels on strong edges from which on an image is dithered
+GROUND, NEAR_GROUND = 0.3, 8  # share of pixels so near [levels] to the most frequent colour, from which on
+# edges are drawn on a ground of that colour
+CROSS = (0, 1), (2, 1), (1, 0), (1, 2)  # offsets of the four neighbours from the upper left of 3x3 pixels
+SPECKLED = 0.03  # share of pixels unlike all their neighbours, above which edges are the dots of a dither
+LEAST_LINE_SIDE = 64  # [px] shorter side below which thin ink is drawn by its outlines: letters, icons
 GRAINY = 0.02  # share of pixels that are paper or away from edges, below which those edges are grain
 FEW_IN_GRAIN = 0.75  # share of calmed pixels in few colours, from which on a grainy image is a drawing: with
 # grain of 11 to 16 levels photographs have 0.2 to 0.6, drawings 0.85 or more
@@ -65,15 +70,16 @@ def _guess(image: FloatArray) -> Guess:
     step = _step(part)
     edges = step > EDGE
     share = (step > 2 * EDGE).mean()
-    if share > DITHERED:
+    ground = (np.abs(part - colors[counts.argmax()]).max(axis=2) <= NEAR_GROUND).mean()
+    if share > DITHERED and (ground < GROUND or _isolated(part) > SPECKLED):
         return Guess("photo", f"{share:.0%} of the pixels are edges")
-    if _is_line_art(part):
+    if min(height, width) >= LEAST_LINE_SIDE and _is_line_art(part):
         return Guess("line", "thin ink on paper")
     paper = (part == colors[counts.argmax()]).all(axis=2)
     beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
         few = _few_colors(part, np.zeros_like(edges), blurs=2)
-        why = f"{few:.0%} of the pixels, without their grain, have one of {FLAT_COLORS} colours"
+        why = f"{few:.0%} of the pixels, without their grain, have one of few colours"
         return Guess("drawing" if few >= FEW_IN_GRAIN else "photo", why)
     evenness = _evenness(part, step, ~paper & ~beside)
     is_even = f"{evenness:.0%} of the pixels away from edges are even"
@@ -81,7 +87,7 @@ def _guess(image: FloatArray) -> Guess:
         return Guess("drawing", is_even)
     few = _few_colors(part, edges, blurs=1)
     if few >= FEW:
-        return Guess("drawing", f"{few:.0%} of the pixels away from edges have one of {FLAT_COLORS} colours")
+        return Guess("drawing", f"{few:.0%} of the pixels away from edges have one of few colours")
     return Guess("photo", is_even)
 
 
@@ -100,6 +106,15 @@ def _colors(levels: Ints) -> tuple[Ints, Ints]:
     return (keys[:, None] >> shifts) & 255, counts
 
 
+def _isolated(levels: Ints) -> float:
+    """Return the share of pixels that are darker than all four neighbours, or lighter, as at an edge."""
+    tone = levels.mean(axis=2)
+    inner = tone[1:-1, 1:-1]
+    off = np.stack([inner - tone[y : y + inner.shape[0], x : x + inner.shape[1]] for y, x in CROSS])
+    apart = (off > 2 * EDGE).all(axis=0) | (off < -2 * EDGE).all(axis=0)
+    return float(apart.mean()) if inner.size else 0.0
+
+
 def _step(levels: Ints) -> Ints:
     """Return the largest step to any of the four neighbours, over the channels, shape (height, width)."""
     right = np.abs(np.diff(levels, axis=1)).max(axis=2)
@@ -114,7 +129,7 @@ def _step(levels: Ints) -> Ints:
 SPRITE = 128  # [px] longer side of an image whose pixels may each be a cell
 FREQUENT, FREQUENT_PIXELS = 0.002, 3  # share of the pixels, and pixels, of a colour that is no antialiasing
 MOSTLY_FREQUENT = 0.97  # least share of the pixels in such colours
-REPEATED = 0.3  # least share of columns, and of rows, like the one before in pixel art that was enlarged
+SINGLE = 0.6  # share of columns, or rows, unlike both neighbours, above which an image was not enlarged
 
 
 def _cells(image: FloatArray, counts: Ints) -> str | None:
@@ -127,9 +142,8 @@ def _cells(image: FloatArray, counts: Ints) -> str | None:
             is_art = CELLS[0] <= min(cells) and max(cells) <= CELLS[1]
             return f"{len(counts)} colours in cells of {cell}x{cell} px" if is_art else None
         frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
-        size = np.array(image.shape[:2])
-        is_small = size.max() <= SPRITE
-        is_scaled = (1 - (np.array([len(down), len(across)]) - 2) / size).min() > REPEATED
+        is_small = max(image.shape[:2]) <= SPRITE
+        is_scaled = max((np.diff(lines) == 1).mean() for lines in (across, down)) < SINGLE
         is_plain = frequent >= MOSTLY_FREQUENT * counts.sum()
         if (is_small or is_scaled) and is_plain and not _is_antialiased(_levels(image)):
             return f"{len(counts)} colours with hard edges"
@@ -194,8 +208,9 @@ def _evenness(levels: Ints, step: Ints, rest: Bools) -> float:
     return float(max((step[rest] <= 1).mean(), (bend[rest] <= 1).mean()))
 
 
-FLAT_COLORS = 10
+FLAT_COLORS, FLAT_GREYS = 10, 4  # so many colours, of 13 levels each, are half of all greys
 SAMPLES = 60_000  # pixels in which colours are counted
+GREY = 4  # [levels] mean difference of the channels below which an image is grey
 NEAR_COLOR = 6  # [levels] distance of a pixel from a colour that it counts as
 
 
@@ -210,7 +225,8 @@ def _few_colors(levels: Ints, edges: Bools, blurs: int) -> float:
     rest: Floats = calm[~edges].astype(np.float32)
     rest = rest[:: max(1, len(rest) // SAMPLES)]
     total = len(rest)
-    for _ in range(FLAT_COLORS):
+    is_grey = total and (rest[:, :3].max(axis=1) - rest[:, :3].min(axis=1)).mean() < GREY
+    for _ in range(FLAT_GREYS if is_grey else FLAT_COLORS):
         if not len(rest):
             break
         key = np.zeros(len(rest), np.int64)
