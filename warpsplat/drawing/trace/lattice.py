@@ -18,7 +18,7 @@ TURN = 4096
 """Steps of a turn: periods are sought among ``TURN`` / whole numbers."""
 
 AMPLITUDE = 1 << 14
-"""Of the sine table, in whole numbers: their sums do not depend on the processor."""
+"""Amplitude of the sine table, in whole numbers: their sums do not depend on the processor."""
 
 PERIODS = (1.4, 64.0)
 """Shortest and longest period [px]."""
@@ -49,7 +49,7 @@ RARE, STRAYED = 0.02, 3.0
 largest difference from it."""
 
 MOST_COLORS = 64
-"""Of pixel art."""
+"""Most colours of pixel art."""
 
 OUTLIERS = 0.01
 """Share of the cells that are in none of the colours, and are given the nearest."""

@@ -143,7 +143,8 @@ def _cells(image: FloatArray, counts: Ints) -> str | None:
             return f"{len(counts)} colours in cells of {cell}x{cell} px" if is_art else None
         frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
         is_small = max(image.shape[:2]) <= SPRITE
-        is_scaled = max((np.diff(lines) == 1).mean() for lines in (across, down)) < SINGLE
+        sizes = np.diff(across), np.diff(down)
+        is_scaled = all(len(each) >= CELLS[0] and (each == 1).mean() < SINGLE for each in sizes)
         is_plain = frequent >= MOSTLY_FREQUENT * counts.sum()
         if (is_small or is_scaled) and is_plain and not _is_antialiased(_levels(image)):
             return f"{len(counts)} colours with hard edges"
