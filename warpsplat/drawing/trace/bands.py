@@ -157,12 +157,12 @@ def _piece(image: Floats, whole: _Piece, mask: Bools) -> _Piece:
     pixels = box[mask].astype(np.float64)
     mean = pixels.mean(axis=0)
     flat = float(((pixels - mean) ** 2).sum())
-    best = _Piece(left, top, mask, Coloring(np.round(mean)), flat)
+    best = _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
     ramp = fit_ramp(box, mask, left, top)
     if ramp is not None:
         error = pixels.size * ramp.residual**2
         if error < flat * FLAT_BYTES / RAMP_BYTES:
-            return _Piece(left, top, mask, Coloring(mean, ramp), error)
+            return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
     return best
 
 
