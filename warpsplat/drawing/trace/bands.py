@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
-from warpsplat.drawing.trace.palette import UNEVEN, UNEVEN_NOISE, Coloring, Parts
+from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.portable import filters
 from warpsplat.portable.linear import product
@@ -55,7 +55,7 @@ def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
         parts: of the image.
         noise: of flat regions [levels].
     """
-    waiting = _uneven(image, parts, UNEVEN + UNEVEN_NOISE * noise)
+    waiting = _uneven(image, parts, UNEVEN + noise)
     if not waiting:
         return parts
     error = sum(piece.error for piece in waiting) + image.size * (FLOOR + noise) ** 2
