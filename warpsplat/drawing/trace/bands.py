@@ -48,7 +48,7 @@ class _Piece:
 
 
 def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
-    """Cut parts that neither a flat colour nor a gradient describes into bands, as long as it is worth the bytes.
+    """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
 
     Args:
         image: premultiplied, 0..255, shape (height, width, 4).
@@ -80,11 +80,13 @@ def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
 
 
 def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
-    """Return the parts whose pixels are off their colouring by more than ``least`` in the root mean square."""
+    """Return the parts that are off their colouring by more than ``least`` in the root mean square."""
     found = []
     sizes = np.bincount(parts.labels[parts.labels >= 0], minlength=len(parts.paint))
     off = np.where((parts.labels >= 0)[..., None], image - parts.fills, 0)
-    flat = np.bincount(np.maximum(parts.labels, 0).reshape(-1), (off**2).sum(axis=2).reshape(-1), len(parts.paint))
+    flat = np.bincount(
+        np.maximum(parts.labels, 0).reshape(-1), (off**2).sum(axis=2).reshape(-1), len(parts.paint)
+    )
     for part in np.flatnonzero(sizes >= 2 * LEAST_BAND).tolist():
         coloring = parts.colorings[parts.paint[part]]
         values = int(sizes[part]) * image.shape[2]
@@ -100,6 +102,8 @@ def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
 def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
     """Return the connected parts of the lighter and the darker half of a piece."""
     own, mask = image[piece.box()], piece.mask
+    if mask.sum() < 2 * LEAST_BAND or not np.ptp(own[mask], axis=0).any():
+        return []
     pixels = own[mask].astype(np.float64)
     tone = ((own - pixels.mean(axis=0)) * _direction(pixels)).sum(axis=2)
     weight = filters.gaussian_blur(mask, SOFT)
@@ -172,7 +176,9 @@ def _with_bands(image: Floats, parts: Parts, pieces: list[_Piece]) -> Parts:
     for number, piece in enumerate(pieces, len(parts.paint)):
         labels[piece.box()][piece.mask] = number
         color = image[piece.box()] if piece.coloring.ramp else piece.coloring.color
-        fills[piece.box()][piece.mask] = np.broadcast_to(color, (*piece.mask.shape, image.shape[2]))[piece.mask]
+        fills[piece.box()][piece.mask] = np.broadcast_to(color, (*piece.mask.shape, image.shape[2]))[
+            piece.mask
+        ]
     first = len(parts.colorings)
     paint = np.concatenate([parts.paint, np.arange(first, first + len(pieces), dtype=parts.paint.dtype)])
     return Parts(labels, fills, paint, parts.colorings + [piece.coloring for piece in pieces])

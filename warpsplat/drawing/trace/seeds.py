@@ -18,7 +18,7 @@ EDGE = 24  # [levels] step between neighbours that is an edge, whatever the nois
 NOISE_QUANTILE = 70  # [%] of the steps beside edges, that measures the noise
 
 BEND_OF_NOISE, ROUNDING = 1.7, 0.6
-"""How much steps of noise differ over how large they are, and what rounding to levels adds to that [levels]."""
+"""How much steps of noise differ over their size, and what rounding to levels adds to that [levels]."""
 
 FLAT_STEP = 1.0  # [levels] largest step between neighbours of a flat region, besides noise
 RAMP_STEP = 12.0  # [levels] largest step between neighbours on a ramp, besides noise; more is an edge
