@@ -8,13 +8,12 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth, dilated
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, dilated
 from warpsplat.drawing.trace.lattice import CELLS, MOST_COLORS, find_lattice
 from warpsplat.drawing.trace.pixels import changes
-from warpsplat.portable.sequences import convolve
 from warpsplat.scene import FloatArray
 
-Subject = Literal["photo", "drawing", "line", "pixel"]
+Subject = Literal["photo", "drawing", "pixel"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ TINY_SIDE, TINY_SIDE_PIXELS = 2, 1024
 
 
 def guess_subject(image: FloatArray) -> Guess:
-    """Tell photographs, drawings, line art and pixel art apart.
+    """Tell photographs, drawings and pixel art apart: what is drawn in lines is a drawing, too.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
@@ -50,7 +49,6 @@ GROUND, NEAR_GROUND = 0.3, 8  # share of pixels so near [levels] to the most fre
 # edges are drawn on a ground of that colour
 CROSS = (0, 1), (2, 1), (1, 0), (1, 2)  # offsets of the four neighbours from the upper left of 3x3 pixels
 SPECKLED = 0.03  # share of pixels unlike all their neighbours, above which edges are the dots of a dither
-LEAST_LINE_SIDE = 64  # [px] shorter side below which thin ink is drawn by its outlines: letters, icons
 GRAINY = 0.02  # share of pixels that are paper or away from edges, below which those edges are grain
 FEW_IN_GRAIN = 0.75  # share of calmed pixels in few colours, from which on a grainy image is a drawing: with
 # grain of 11 to 16 levels photographs have 0.2 to 0.6, drawings 0.85 or more
@@ -73,8 +71,6 @@ def _guess(image: FloatArray) -> Guess:
     ground = (np.abs(part - colors[counts.argmax()]).max(axis=2) <= NEAR_GROUND).mean()
     if share > DITHERED and (ground < GROUND or _isolated(part) > SPECKLED):
         return Guess("photo", f"{share:.0%} of the pixels are edges")
-    if min(height, width) >= LEAST_LINE_SIDE and _is_line_art(part):
-        return Guess("line", "thin ink on paper")
     paper = (part == colors[counts.argmax()]).all(axis=2)
     beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
@@ -169,34 +165,6 @@ def _is_antialiased(levels: Ints) -> bool:
         is_edge = np.abs(between).max(axis=2) > EDGE
         seen[:, 1:-1] |= is_edge & (off < NEAR_MIXTURE) & (np.abs(share - 0.5) < 0.4)
     return bool(mixed.sum() > MIXED * max(1, (_step(levels) > EDGE).sum()))
-
-
-LIGHT_PAPER, CONTRAST = 160, 80  # [levels] of the paper, and of it over the ink, at the least
-PAPER_NOISE = 24  # [levels] that paper may be off its usual one
-LEAST_PAPER, LEAST_INK = 0.7, 0.002  # share of the pixels
-LINE, LINE_SHARE = 2.5, 0.006
-"""Half the width of the broadest line [px], and over the longer side of the image, if that is more."""
-
-
-def _is_line_art(levels: Ints) -> bool:
-    """Return whether there is little but thin dark lines on light paper."""
-    flat = levels[..., :3].astype(np.int32)
-    if levels.shape[2] == 4:
-        flat = flat + 255 - levels[..., 3:].astype(np.int32)
-    grey = flat.min(axis=2).astype(np.uint8)
-    histogram = np.bincount(grey.reshape(-1), minlength=256)
-    paper = int(convolve(np.pad(histogram, 4), np.ones(9)).argmax())
-    darkest = float(np.percentile(grey, 0.2))
-    if paper < LIGHT_PAPER or paper - darkest < CONTRAST:
-        return False
-    ink = grey < 0.5 * (paper + darkest)
-    blank = np.abs(grey.astype(np.int32) - paper) <= PAPER_NOISE
-    if blank.mean() < LEAST_PAPER or ink.mean() < LEAST_INK:
-        return False
-    beside = dilated(ink, 5)
-    if (~blank & ~beside).mean() > max(0.005, 0.1 * ink.mean()):
-        return False
-    return bool(np.quantile(depth(ink)[ink], 0.97) <= max(LINE, LINE_SHARE * max(grey.shape)))
 
 
 def _evenness(levels: Ints, step: Ints, rest: Bools) -> float:
