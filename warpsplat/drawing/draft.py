@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -50,7 +51,10 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
         if settings.is_limited:
             scene = limited(scene.take(solid_shapes(scene)), settings)
         scene = enlarged(cut(scene, across, down), size, *problem.size)
-        return as_fit(scene, min(DRAFT_GRID, finest(settings)) / size, problem, run)
+        per_pixel = min(DRAFT_GRID, finest(settings)) / size
+        if settings.max_bytes or any(margin):
+            return as_fit(scene, per_pixel, problem, run)
+        return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
 
     margin = margins(problem.target, THIN_SIDE)
     if not any(margin):

@@ -121,7 +121,7 @@ class Fit:
     per_pixel: float
     """View box units per pixel of the grid that the scene is rounded to, or can be."""
     render_psnr: float
-    """PSNR of the last training render, at its size [dB]."""
+    """PSNR of the last training render, at its size [dB]; NaN: a trace, which was not rendered."""
     estimated_psnr: float
     """PSNR by the last step's loss [dB]: once the file is evaluated, an estimate of the file's."""
     iterations: int
