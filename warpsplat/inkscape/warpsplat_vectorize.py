@@ -1,7 +1,7 @@
 """org.warpsplat.vectorize: put vectors above the selected bitmaps of a document.
 
-Inkscape runs this file alone, with its own Python, 3.8 or newer: the standard library is all there is. It gives
-the document as a file, and reads the changed one from stdout. It shows what is on stderr.
+Inkscape runs this file alone, with its own Python, 3.8 or newer: only the standard library is there. It gives
+the document as a file, reads the changed one from stdout, and shows what is on stderr.
 """
 
 from __future__ import annotations
