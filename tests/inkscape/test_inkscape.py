@@ -57,5 +57,4 @@ def test_it_vectorizes_what_is_selected(tmp_path: Path) -> None:
     assert result.index('id="i"') < result.index('id="i-vectors"') < result.index("<path")
     there = pixels(text)
     error, all_of_it = (np.abs(pixels(without_images(one)) - there).mean() for one in (result, text))
-    print(error / all_of_it)
-    assert error < 0.1 * all_of_it
+    assert error < 0.02 * all_of_it  # 0.003; a shift by one unit: 0.05
