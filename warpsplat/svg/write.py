@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from xml.sax.saxutils import escape
+from html import escape
 
 import numpy as np
 import numpy.typing as npt
@@ -282,7 +282,7 @@ UNPRINTABLE = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 def titled(title: str) -> str:
     """Return a ``title`` element, or nothing for an empty title."""
-    return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
+    return f"<title>{escape(UNPRINTABLE.sub('', title), quote=False)}</title>" if title else ""
 
 
 def head_of(width: object, height: object, view: str) -> str:
