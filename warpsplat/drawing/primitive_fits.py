@@ -15,10 +15,14 @@ from warpsplat.svg.primitives import Primitive
 
 Floats = npt.NDArray[np.float64]
 
-ROUNDS = 8  # of Gauss and Newton's method, which begins within a pixel of the minimum
+ROUNDS = 12  # of Gauss and Newton's method
 STEP = 1e-4  # [px] of numeric derivatives
 DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
 LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
+FIRST_REACH, LAST_REACH = (
+    0.5,
+    0.5,
+)  # [half the size] at first, [px] in the end: samples farther off count little
 
 
 class Samples(NamedTuple):
@@ -34,11 +38,10 @@ class Samples(NamedTuple):
 class Family:
     """A kind of basic shape, by half its sides and the radii of its corners."""
 
-    name: str
-    sizes: int
-    """Free sizes besides the place of the centre."""
+    values: tuple[str, ...]
+    """Kinds of its free values: the centre's two coordinates first, then sizes."""
     size: int
-    """About its bytes in a file."""
+    """About its bytes in a file: path data with arcs have as many as an element."""
     boxes: Callable[[Floats], tuple[Floats, Floats]]
     """Half the sides and the radii, both (outline, 2), by the free sizes (outline, size)."""
 
@@ -58,13 +61,13 @@ def _rounded(sizes: Floats) -> tuple[Floats, Floats]:
 
 
 FAMILIES = (
-    Family("circle", 1, 38, _circle),
-    Family("rectangle", 2, 22, lambda sizes: (sizes, np.zeros_like(sizes))),
-    Family("ellipse", 2, 42, lambda sizes: (sizes, sizes)),
-    Family("pill", 2, 50, _pill),
-    Family("rounded", 3, 56, _rounded),
+    Family(("x", "y", "side"), 38, _circle),
+    Family(("x", "y", "side", "side"), 22, lambda sizes: (sizes, np.zeros_like(sizes))),
+    Family(("x", "y", "side", "side"), 42, lambda sizes: (sizes, sizes)),
+    Family(("x", "y", "side", "side"), 50, _pill),
+    Family(("x", "y", "side", "side", "radius"), 56, _rounded),
 )
-"""Their bytes are those of an element, which has as many as path data with arcs."""
+"""Circles, rectangles, ellipses, and rectangles with round ends and with round corners."""
 
 
 def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
@@ -89,56 +92,61 @@ def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
 class Fits(NamedTuple):
     """The nearest shapes of a family."""
 
-    centers: Floats
-    """Shape (outline, 2) [px]."""
-    half: Floats
-    """Half the sides, shape (outline, 2) [px]."""
-    radii: Floats
-    """Of the corners, shape (outline, 2) [px]."""
+    values: Floats
+    """Shape (outline, value) [px]."""
+    stiffness: Floats
+    """Growth of the weighted squares with the square of each value's change, shape (outline, value)."""
     off: Floats
     """Distances of the samples, shape (outline, sample) [px]."""
 
-    def areas(self) -> Floats:
-        """Return their areas, shape (outline,) [px²]."""
-        return np.asarray(4 * self.half.prod(axis=1) - (4 - np.pi) * self.radii.prod(axis=1))
-
-    def shape_of(self, outline: int, *, is_clockwise: bool) -> Primitive:
-        """Return the shape of one outline."""
-        low, high = self.centers[outline] - self.half[outline], self.centers[outline] + self.half[outline]
-        ends = (tuple(values.tolist()) for values in (low, high, self.radii[outline]))
-        return Primitive(*ends, is_clockwise)  # type: ignore[arg-type]  # pairs of floats
-
 
 def nearest(family: Family, samples: Samples) -> Fits:
-    """Return the shapes of a family with the least weighted squares of the samples' distances."""
+    """Return the shapes of a family nearest to most of the samples, by weighted least squares.
+
+    Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
+    """
     points, weights = samples
     values = _start(family, samples)
+    reach = FIRST_REACH * values[:, 2:].max(axis=1)
+    unit = np.eye(values.shape[1])
 
     def off(values: Floats) -> Floats:
         half, radii = family.boxes(values[:, 2:])
         return distances(points - values[:, None, :2], half, radii)
 
-    count = values.shape[1]
     for _ in range(ROUNDS):
         here = off(values)
-        slopes = np.stack([(off(values + STEP * unit) - here) / STEP for unit in np.eye(count)], axis=2)
-        weighted = slopes * weights[..., None]
-        system = np.stack([(weighted * slopes[..., k, None]).sum(axis=1) for k in range(count)], axis=1)
-        scale = np.trace(system, axis1=1, axis2=2)[:, None, None] / count + 1e-12
-        system += DAMPING * scale * np.eye(count)
-        values = values - solve(system, (weighted * here[..., None]).sum(axis=1)[..., None])[..., 0]
+        slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit], axis=2)
+        trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2
+        weighted = slopes * trust[..., None]
+        system = np.stack([(weighted * slopes[..., k, None]).sum(axis=1) for k in range(len(unit))], axis=1)
+        stiffness = np.diagonal(system, axis1=1, axis2=2)
+        damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
+        values = values - solve(damped, (weighted * here[..., None]).sum(axis=1)[..., None])[..., 0]
         values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
-    half, radii = family.boxes(values[:, 2:])
-    return Fits(values[:, :2], half, radii, off(values))
+        reach = np.maximum(reach / 2, LAST_REACH)
+    return Fits(values, stiffness, off(values))
 
 
 def _start(family: Family, samples: Samples) -> Floats:
     """Return centres and sizes from the samples' boxes, shape (outline, value)."""
-    seen = samples.weights > 0
-    low = np.where(seen[..., None], samples.points, np.inf).min(axis=1)
-    high = np.where(seen[..., None], samples.points, -np.inf).max(axis=1)
+    low, high = samples.points.min(axis=1), samples.points.max(axis=1)
     center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)
-    if family.sizes == 1:
-        return np.concatenate([center, half.mean(axis=1, keepdims=True)], axis=1)
-    corner = 0.5 * half.min(axis=1, keepdims=True)
-    return np.concatenate([center, half, corner][: family.sizes], axis=1)
+    least = half.min(axis=1, keepdims=True)
+    sizes = (
+        np.concatenate([half, 0.5 * least], axis=1) if len(family.values) > 3 else half.mean(1, keepdims=True)
+    )
+    return np.concatenate([center, sizes], axis=1)[:, : len(family.values)]
+
+
+def shape_of(family: Family, values: Floats, *, is_clockwise: bool) -> Primitive:
+    """Return the shape with some values, shape (value,)."""
+    half, radii = (x[0] for x in family.boxes(values[None, 2:]))
+    (x, y), (a, b), (rx, ry) = values[:2].tolist(), half.tolist(), radii.tolist()
+    return Primitive((x - a, y - b), (x + a, y + b), (rx, ry), is_clockwise)
+
+
+def areas(family: Family, values: Floats) -> Floats:
+    """Return the areas of shapes [px²]."""
+    half, radii = family.boxes(values[:, 2:])
+    return np.asarray(4 * half.prod(axis=1) - (4 - np.pi) * radii.prod(axis=1))

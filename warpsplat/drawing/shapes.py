@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
-from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest
+from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
+from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
 from warpsplat.drawing.trace.curves import Pieces
@@ -40,8 +42,8 @@ BESIDE = 1.5
 SEEN = 1e-3
 """Least squared difference of these colours of an outline that shows: 5 levels in each channel."""
 
-CUBIC_BYTES, LINE_BYTES, LEVEL_BYTES, MOVE_BYTES = 19, 7, 4, 6
-"""Bytes of a cubic, a line, a level or upright one, and the beginning of a contour in a file."""
+CUBIC_BYTES, LINE_BYTES, LEVEL_BYTES, MOVE_BYTES, NUMBER_BYTES = 19, 7, 4, 6, 3
+"""Bytes of a cubic, a line, a level or upright one, the beginning of a contour, and a number in a file."""
 
 CHECKS = 4
 """Most renders that confirm replacements: those that cost too much are taken back."""
@@ -56,12 +58,26 @@ class Candidate:
     """A basic shape in place of a contour."""
 
     contour: int
-    made: Primitive
-    """In pixels."""
-    cells: Cells
-    """That it changes."""
+    cubics: Floats
+    """Of the contour, shape (piece, 4, 2)."""
+    family: Family
+    values: Floats
+    """Shape (value,)."""
+    stiffness: Floats
+    """Error by the square of each value's change, shape (value,)."""
+    is_clockwise: bool
     saved: float
     """Bytes."""
+
+    @cached_property
+    def made(self) -> Primitive:
+        """The shape."""
+        return shape_of(self.family, self.values, is_clockwise=self.is_clockwise)
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The cells that it changes."""
+        return joined([*cells_around(self.cubics), *cells_around(self.made.cubics())])
 
 
 def with_shapes(
@@ -76,7 +92,7 @@ def with_shapes(
         errors: Those of the drawing.
         worth: Mean squared error that a byte is worth.
     """
-    left = _candidates(target, drawing.scene, worth)
+    left = with_equal_values(_candidates(target, drawing.scene, worth), worth)
     for _ in range(CHECKS):
         if not left:
             break
@@ -103,19 +119,70 @@ def _candidates(target: FloatArray, scene: Scene, worth: float) -> list[Candidat
         if not len(likely):
             continue
         samples, cubics = Samples(samples.points[likely], samples.weights[likely]), cubics[likely]
-        turning = _areas(samples.points) > 0
-        sizes = _sizes(cubics)
+        areas, sizes = _areas(samples.points), _sizes(cubics)
         made = [nearest(family, samples) for family in FAMILIES]
         costs = np.stack(
-            [_costs(family, fits, samples, worth) for family, fits in zip(FAMILIES, made, strict=True)]
+            [_costs(f, fits, samples, areas, worth) for f, fits in zip(FAMILIES, made, strict=True)]
         )
         best = costs.argmin(axis=0)
         for i in np.flatnonzero(np.isfinite(costs.min(axis=0))).tolist():
-            shape = made[best[i]].shape_of(i, is_clockwise=bool(turning[i]))
-            cells = joined([*cells_around(cubics[i]), *cells_around(shape.cubics())])
-            saved = float(sizes[i]) - FAMILIES[best[i]].size
-            found.append(Candidate(int(group.contours[likely[i]]), shape, cells, saved))
+            family, fits = FAMILIES[best[i]], made[best[i]]
+            saved = float(sizes[i]) - family.size
+            own = int(group.contours[likely[i]])
+            values = fits.values[i], fits.stiffness[i]
+            found.append(Candidate(own, cubics[i], family, *values, bool(areas[i] > 0), saved))
     return found
+
+
+def with_equal_values(candidates: list[Candidate], worth: float) -> list[Candidate]:
+    """Return candidates with equal sizes and places where they differ by less than a number is worth.
+
+    Values of one kind are merged in pairs, those first that cost least (Ward 1963).
+    """
+    values = [one.values.copy() for one in candidates]
+    saved = [one.saved for one in candidates]
+    for kind in ("x", "y", "side", "radius"):
+        places = [
+            (i, k)
+            for i, one in enumerate(candidates)
+            for k, name in enumerate(one.family.values)
+            if name == kind
+        ]
+        exact = np.array([values[i][k] for i, k in places])
+        stiffness = np.array([candidates[i].stiffness[k] for i, k in places])
+        merged, counts = merge_near(exact, stiffness, NUMBER_BYTES * worth)
+        for (i, k), value, count in zip(places, merged.tolist(), counts.tolist(), strict=True):
+            values[i][k] = value
+            saved[i] += NUMBER_BYTES * (count - 1) / count
+    return [
+        replace(one, values=own, saved=bytes_)
+        for one, own, bytes_ in zip(candidates, values, saved, strict=True)
+    ]
+
+
+def merge_near(values: Floats, stiffness: Floats, price: float) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return values, near ones replaced by their mean, and how many each stands for.
+
+    Args:
+        values: Shape (value,).
+        stiffness: Cost of the square of each one's change.
+        price: Most that merging two groups may cost.
+    """
+    order = np.argsort(values, kind="stable")
+    mean, weight = values[order], np.maximum(stiffness[order], 1e-30)
+    size = np.ones(len(values), np.int64)
+    while len(mean) > 1:
+        cost = np.diff(mean) ** 2 * weight[1:] * weight[:-1] / (weight[1:] + weight[:-1])
+        k = int(cost.argmin())
+        if cost[k] > price:
+            break
+        mean[k] = (mean[k] * weight[k] + mean[k + 1] * weight[k + 1]) / (weight[k] + weight[k + 1])
+        weight[k] += weight[k + 1]
+        size[k] += size[k + 1]
+        mean, weight, size = (np.delete(x, k + 1) for x in (mean, weight, size))
+    found, counts = np.empty_like(values), np.empty(len(values), np.int64)
+    found[order], counts[order] = np.repeat(mean, size), np.repeat(size, size)
+    return found, counts
 
 
 def _samples(target: FloatArray, cubics: Floats) -> tuple[Samples, npt.NDArray[np.bool_]]:
@@ -125,7 +192,7 @@ def _samples(target: FloatArray, cubics: Floats) -> tuple[Samples, npt.NDArray[n
     image's mean squared error. ``cubics``: shape (contour, piece, 4, 2).
     """
     t = (np.arange(SAMPLES_PER_PIECE) + 0.5) / SAMPLES_PER_PIECE
-    points = points_at(cubics, t).reshape(len(cubics), -1, 2)
+    points = np.asarray(points_at(cubics, t).reshape(len(cubics), -1, 2), np.float64)
     along = (np.roll(points, -1, axis=1) - np.roll(points, 1, axis=1)) / 2
     lengths = np.maximum(hypot(along[..., 0], along[..., 1]), 1e-9)
     normals = np.stack([-along[..., 1], along[..., 0]], axis=2) / lengths[..., None]
@@ -138,7 +205,8 @@ def _samples(target: FloatArray, cubics: Floats) -> tuple[Samples, npt.NDArray[n
     contrast = ((sides[1] - sides[0]) ** 2).sum(axis=2)
     shows = contrast > SEEN
     seen = (lengths * shows).sum(axis=1) >= LEAST_SEEN * lengths.sum(axis=1)
-    return Samples(points, np.where(shows, contrast, 0) * lengths / (3 * width * height)), seen
+    weights = np.where(shows, contrast, 0) * lengths / (3 * width * height)
+    return Samples(points, weights.astype(np.float64)), seen
 
 
 def _areas(points: Floats) -> Floats:
@@ -157,14 +225,15 @@ def _sizes(cubics: Floats) -> Floats:
     return np.asarray(MOVE_BYTES + size.sum(axis=1))
 
 
-def _costs(family: Family, fits: Fits, samples: Samples, worth: float) -> Floats:
+def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: float) -> Floats:
     """Return the cost of each shape of a family, in error and bytes; infinite where it is too far off."""
-    off = np.where(samples.weights > 0, fits.off, 0)
-    near = np.abs(off).max(axis=1) <= MOST_OFF
-    whole = np.abs(np.abs(_areas(samples.points)) - fits.areas()) <= MOST_OFF * fits.half.sum(axis=1) * 2
-    hidden = (samples.weights == 0).any(axis=1)
-    cost = (samples.weights * off**2).sum(axis=1) + worth * family.size
-    return np.where(near & (whole | hidden), cost, np.inf)
+    far = np.abs(fits.off) > MOST_OFF
+    shown = samples.weights > 0
+    near = (shown & ~far).sum(axis=1) >= LEAST_SEEN * fits.off.shape[1]
+    missing = np.abs(np.abs(areas) - shape_areas(family, fits.values))
+    same = missing <= 4 * MOST_OFF * fits.values[:, 2:].max(axis=1)
+    cost = (samples.weights * np.minimum(np.abs(fits.off), MOST_OFF) ** 2).sum(axis=1) + worth * family.size
+    return np.where(near & (same | (far | ~shown).any(axis=1)), cost, np.inf)
 
 
 def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
@@ -176,10 +245,11 @@ def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     for one in chosen:
         cubics = one.made.cubics()
         points[one.contour] = cubics[:, :3].reshape(-1, 2).astype(np.float32)
-        joints[one.contour] = joints_of(Pieces(cubics, _is_line(cubics)))
-    counts = np.array([len(own) for own in points], np.int64)
-    first = starts_of(counts)[np.searchsorted(scene.starts, scene.first)]
-    changed = replace(scene, points=np.concatenate(points), starts=starts_of(counts), first=first)
+        joints[one.contour] = joints_of(Pieces(cubics, _is_line(cubics))).astype(np.int32)
+    counts = np.array([len(own) for own in points], np.int32)
+    after = starts_of(counts)
+    first = after[np.searchsorted(scene.starts, scene.first)]
+    changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
     return Drawing(changed, np.concatenate(joints), np.full(len(changed.points), NONE, np.int32))
 
 

@@ -60,7 +60,7 @@ def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
 
 
 def held_points(scene: Scene, exact: Floats) -> Floats:
-    """Return the points of a file: whole numbers, but for handles of lines at the thirds and of exact arcs."""
+    """Return the points of a file: whole numbers, but for handles of lines, at the thirds, and of arcs."""
     rows = cubic_rows(scene)
     rows = rows[straight_cubics(scene, exact)[rows[:, 0]]]
     held = np.round(exact)

@@ -89,7 +89,10 @@ class Primitive:
         return " ".join([tag, *(f'{name}="{number(value, 1)}"' for name, value in values.items())])
 
     def data(self, pen: Pair | None) -> tuple[str, Pair]:
-        """Return path data in whole numbers, and where the pen is then; ``pen``: where it is before, if any."""
+        """Return path data in whole numbers, and where the pen is then.
+
+        ``pen``: where it is before, if any.
+        """
         rx, ry = (round(r) for r in self.radii)
         nodes = [(round(x), round(y)) for x, y in self.cubics()[:, 0].tolist()]
         start = nodes[0]
@@ -101,9 +104,9 @@ class Primitive:
         if pen is not None:
             text = min(text, f"m{row(minus(start, pen), False)}", key=len)
         for x, y in steps:
-            letter, numbers = "a", (rx, ry, 0, large, sweep, x, y)
+            letter, numbers = "a", [rx, ry, 0, large, sweep, x, y]
             if not large and 0 in (x, y):
-                letter, numbers = ("v", (y,)) if x == 0 else ("h", (x,))
+                letter, numbers = ("v", [y]) if x == 0 else ("h", [x])
             text += row(numbers, True) if letter == last else letter + row(numbers, False)
             last = letter
         return text, start
@@ -130,8 +133,8 @@ def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
         x, y = points[..., 0], points[..., 1]
         turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
         for i in np.flatnonzero(likely).tolist():
-            ends = (tuple(values[i].tolist()) for values in (low, high, radii))
-            made = Primitive(*ends, bool(turning[i]))  # type: ignore[arg-type]  # pairs of floats
+            (x0, y0), (x1, y1), (rx, ry) = (values[i].tolist() for values in (low, high, radii))
+            made = Primitive((x0, y0), (x1, y1), (rx, ry), bool(turning[i]))
             if _turned(made, points[i]) is not None:
                 yield int(group.contours[i]), made
 

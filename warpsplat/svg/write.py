@@ -20,9 +20,9 @@ from warpsplat.svg.data import held_points, path_data, units
 from warpsplat.svg.groups import LEVEL_ID, Names, PathElement, color_names, nested, painted
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import hex_colors, number
-from warpsplat.svg.primitives import primitives
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
+from warpsplat.svg.primitives import primitives
 
 OPACITY_DECIMALS = 2
 """Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
