@@ -17,7 +17,7 @@ from warpsplat.svg.numbers import number
 
 Floats = npt.NDArray[np.float64]
 
-HANDLE = 4 * (2**0.5 - 1) / 3
+HANDLE = 4 * (np.sqrt(2) - 1) / 3
 """Length of the handles of a quarter of the unit circle."""
 
 NEAR = 0.01
