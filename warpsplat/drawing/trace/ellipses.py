@@ -7,8 +7,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, lstsq, product, solve
-
-HANDLE = 4 * (np.sqrt(2) - 1) / 3  # length of the handles of a quarter of the unit circle
+from warpsplat.svg.primitives import HANDLE
 
 
 def fit_ellipse(points: Floats, tolerance: float) -> Floats | None:
