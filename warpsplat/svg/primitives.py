@@ -12,13 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
 
 Floats = npt.NDArray[np.float64]
-
-HANDLE = 4 * (np.sqrt(2) - 1) / 3
-"""Length of the handles of a quarter of the unit circle."""
 
 NEAR = 0.01
 """Largest distance of an exact outline's points from their places, in units of the view box: single precision
@@ -69,7 +67,7 @@ class Primitive:
         for i, corner in enumerate(corners):
             a, b, c = places[2 * i : 2 * i + 3]
             if rx > 0:
-                found.append([a, a + HANDLE * (corner - a), b + HANDLE * (corner - b), b])
+                found.append([a, a + ARC_HANDLE * (corner - a), b + ARC_HANDLE * (corner - b), b])
             if not self.is_round[i % 2]:
                 found.append([b, (2 * b + c) / 3, (b + 2 * c) / 3, c])
         cubics = np.array(found)
