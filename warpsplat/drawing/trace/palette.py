@@ -26,6 +26,8 @@ class Coloring:
     color: Floats
     """Mean colour, shape (4,)."""
     ramp: Ramp | None = None
+    is_band: bool = False
+    """Whether it is a step of smooth shading, whose border with the next step is nowhere exactly."""
 
     @property
     def is_clear(self) -> bool:
