@@ -20,7 +20,7 @@ from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import OutlineTracer
+from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
@@ -77,9 +77,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
     cover = Cover(hiding[regions.labels])
-    tracer = OutlineTracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
-    painted = np.flatnonzero((loops.region >= 0) & (ranks[loops.region] >= 0)).tolist()
-    outlines = [(int(loops.region[loop]), tracer.outline(loop)) for loop in painted]
+    outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
     contours: dict[int, list[Pieces]] = {}
