@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import cv2
@@ -122,7 +123,7 @@ class HiddenPaths:
         return [self.goals[part] for part in parts]
 
     def _furthest(self, swept: Floats, path: Ints, at: Ints, last: Ints) -> Ints:
-        """Return the last goals that are reached from goals ``at`` in straight lines, by a galloping search."""
+        """Return the last goals reached from goals ``at`` in straight lines, by a galloping search."""
         best = np.where(self._are_free(swept, path, at, last), last, at + 1)
         high = best.copy()  # not reached, where it is more than the best one
         open_, step = np.flatnonzero(best < last), 1
@@ -148,7 +149,7 @@ class HiddenPaths:
         # Cutting short must not cut off the region itself, which lies on the right.
         corners = self.vertices[j], self.goals[j], self.goals[i], self.vertices[i]
         beside = swept[j] - swept[i]
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in itertools.pairwise(corners):
             beside = beside + a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
         free = beside <= 2 * CUT_OFF
         kept = np.flatnonzero(free)

@@ -78,7 +78,7 @@ class Stretches:
         return np.repeat(np.arange(len(self.loop)), np.diff(self.first))
 
     def changes(self, values: Ints) -> Bools:
-        """Return where a value of each crack differs from that before; whole loops go round, shape (crack,)."""
+        """Return where the value of a crack differs from that before, around whole loops; shape (crack,)."""
         before = np.arange(len(values)) - 1
         before[self.first[:-1]] = np.where(self.whole, self.first[1:], self.first[:-1] + 1) - 1
         return np.asarray(values != values[before])
@@ -114,7 +114,7 @@ class Stretches:
 
     @cached_property
     def points(self) -> tuple[Floats, Ints]:
-        """The good points, without those at T-junctions, and the first of each stretch and, last, their number.
+        """The good points, without those at T-junctions; the first of each stretch and, last, their number.
 
         Of a hidden stretch, those between the boundary and the middles.
         """
@@ -245,7 +245,7 @@ def _part(stretches: Stretches, number: int, start: Floats, end: Floats) -> Poly
 
 
 def _ends(stretches: Stretches) -> tuple[Floats, Floats]:
-    """Return where stretches begin and end, shape (stretch, 2) each; those that are seen go on under others."""
+    """Return where stretches begin and end, (stretch, 2) each; those that are seen go on under others."""
     loops = stretches.layers.loops
     head, last = (stretches.cracks[index] for index in (stretches.first[:-1], stretches.first[1:] - 1))
     starts = loops.vertices[head].astype(np.float64)
@@ -267,7 +267,7 @@ def _extended(stretches: Stretches, seen: Ints, tails: Ints, vertices: Floats, k
     Args:
         stretches: Of all.
         seen: Numbers of those that are seen, shape (n,).
-        tails: Numbers of the last points, from the end of the stretch inwards, -1 for no point; shape (n, TAIL).
+        tails: Numbers of the last points, from the end inwards, -1 for no point; shape (n, TAIL).
         vertices: Where the last crack ends, shape (n, 2).
         kinds: Of the stretch that comes next, shape (n,).
     """

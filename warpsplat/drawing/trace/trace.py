@@ -25,7 +25,8 @@ from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
 OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
-MOST_REGIONS = 3000  # of any image; one with more is no drawing
+LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
+FEW_REGIONS = 3000  # which any image may have
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ def trace(image: FloatArray, *, most: int | None = None) -> Traced:
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
-    regions = fewer_regions(find_regions(levels), MOST_REGIONS)
+    height, width = levels.shape[:2]
+    regions = fewer_regions(find_regions(levels), max(FEW_REGIONS, height * width // LEAST_AREA))
     traced = trace_regions(regions, may_have_ground=is_opaque)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
