@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from warpsplat.fit.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.fit.loop import Fit
 
 

@@ -13,7 +13,7 @@ from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, marg
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.palette import Palette, solid_shapes
@@ -88,7 +88,7 @@ def trace_regions(problem: Problem, most: int | None) -> Drawing:
     """
     settings = problem.settings
     traced = trace(original(problem.target), most=most)
-    drawing = Drawing(traced.scene, traced.joints, traced.same)
+    drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
         drawing = replace(drawing, scene=limited(drawing.scene, settings))

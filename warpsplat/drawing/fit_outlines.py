@@ -1,92 +1,59 @@
 """Fit the outlines of a traced drawing to the image, keeping their corners, lines and smooth joints."""
-
 from __future__ import annotations
+import os
+
 
 import time
-from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from dataclasses import replace
 
-from warpsplat.fit.constraints import Constraints, Drawing, Projection
-from warpsplat.fit.densification import recover
+from warpsplat.drawing.constraints import Constraints, Drawing, Floats
+from warpsplat.drawing.measure import Measure, Samples
+from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
-from warpsplat.fit.progress import Progress
-from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
-from warpsplat.fit.settings import Density, Settings, make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
-from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
-from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.scene import Canvas, FloatArray
 
-Colors = Literal["held", "fitted"]
-
-OUTLINE_STEPS = 200
+STEPS = 12
 """Most steps of a refinement."""
 
-OUTLINE_RATE = 0.25
-"""Learning rate of points at the start [px]: outlines are traced to about a pixel."""
+LEAST_GAIN = 0.005
+"""A refinement ends when a step lowers the error by less than this share."""
 
-FINAL_RATE = 0.02
-"""Learning rates at the end over those at the start: what is left to gain is hundredths of a pixel."""
+DAMPING, CALMER, WILDER = 0.03, 0.3, 8.0
+"""Added curvature at first, as a share, and its factors after a step that lowered the error or did not."""
 
-COLOR_RATE = 0.004
-"""Learning rate of colours: one of 256 levels."""
+HS=int(os.environ.get("HS","8"))
+RAISED = float(os.environ.get("RD","3"))
+LEAST_DAMPING = float(os.environ.get("LD","0.01"))
 
-LEAST_GAIN, GAIN_STEPS = 0.005, 40
-"""A refinement ends when the error has not fallen by this share in so many steps."""
+MOST_STEP = float(os.environ.get("MS","0.7"))
+"""How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
-
-SNAP_DISTANCE = 6 / 255
-"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
-
-SNAP_SHARE = 0.5
-"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """Options of a refinement."""
-
-    steps: int = OUTLINE_STEPS
-    point_rate: float = OUTLINE_RATE
-    """[px] at the start."""
-    colors: Colors = "held"
-    """Whether colours stay, or are fitted and then snapped to those of the image."""
-
-    def settings(self, scene: Scene) -> Settings:
-        """Return the settings: the shapes stay, and the loss is the squared error alone."""
-        plain = make_settings(
-            curves=max(1, min(len(scene), 100_000)),
-            iterations=self.steps,
-            texture=0.0,
-            bending=0.0,
-            final_rate=FINAL_RATE,
-            rates={"points": self.point_rate, "colors": COLOR_RATE},
-        )
-        return replace(plain, coarse=0.0, density=Density(interval=0))
+MOST_FAILURES = int(os.environ.get("MF","3"))
+"""Steps in a row that do not lower the error, after which a refinement ends."""
 
 
 def refine_drawing(
     target: FloatArray,
     drawing: Drawing,
     run: Run,
-    how: Refinement | None = None,
     *,
+    steps: int = STEPS,
     held: npt.NDArray[np.bool_] | None = None,
     capacity: Capacity | None = None,
 ) -> Drawing:
-    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities stay.
+    """Fit the outlines of a drawing jointly, by exact coverage at full size; all but their points stays.
 
     Args:
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height, width,
             4), of a scene on a transparent canvas.
         drawing: fills of cubics.
         run: how the work is carried out; when it is over, the best so far is taken.
-        how: rates and steps.
-        held: points that stay where they are, shape (point,).
+        steps: most renders.
+        held: which cubics begin at points that stay where they are, shape (cubic,).
         capacity: of the renderer to begin with, if it is known.
 
     Returns:
@@ -95,37 +62,86 @@ def refine_drawing(
     Raises:
         ValueError: joints do not fit the scene, or its shapes are not fills of cubics.
     """
-    how = how or Refinement()
     if not len(drawing.scene):
         return drawing
-    target = matching(target, drawing.scene.canvas)
-    step = start(target, drawing, run.backend, how, held, capacity)
-    best, least = _evaluate(step)
-    gained = 0
-    """Steps at the last gain that counts."""
-    for done in range(1, how.steps + 1):
-        step.advance()
-        if done % CHECK_INTERVAL == 0 or done == how.steps:
-            recover(step, replaces=False)
-            found, error = _evaluate(step)
-            if error < (1 - LEAST_GAIN) * least:
-                gained = done
-            if error < least:
-                best, least = found, error
-            if run.on_progress:
-                run.report(_progress(step, done, how.steps, time.monotonic() - run.started))
-        if done - gained >= GAIN_STEPS or run.over():
-            break
-    if how.colors == "fitted":
-        snapped = replace(best, colors=own_colors(best, target))
-        step.state.parameters.assign(snapped)
-        best = _evaluate(step)[0]
-    return replace(drawing, scene=best)
+    fit = OutlineFit(matching(target, drawing.scene.canvas), drawing, run, held, capacity)
+    fit.advance(steps)
+    return fit.drawing
 
 
-def _progress(step: Step, done: int, steps: int, seconds: float) -> Progress:
-    shapes, snapshot = step.state.shape_count, step.snapshot()
-    return Progress(done, steps, step.psnr(), seconds, done / steps, True, shapes, snapshot)
+class OutlineFit:
+    """A drawing that is fitted step by step."""
+
+    def __init__(
+        self,
+        target: FloatArray,
+        drawing: Drawing,
+        run: Run,
+        held: npt.NDArray[np.bool_] | None = None,
+        capacity: Capacity | None = None,
+    ) -> None:
+        self._run, self._drawing = run, drawing
+        self._following = drawing.following()
+        self._constraints = Constraints(drawing, held)
+        self.measure = Measure(target, drawing, run.backend, capacity)
+        self.points = self._constraints.project(drawing.scene.points.astype(np.float64))
+        self.error = self.measure.error(self.points)
+
+    @property
+    def drawing(self) -> Drawing:
+        """The drawing as fitted so far."""
+        return replace(
+            self._drawing, scene=replace(self._drawing.scene, points=self.points.astype(np.float32))
+        )
+
+    @property
+    def capacity(self) -> Capacity:
+        """Capacity of the renderer's arrays."""
+        return self.measure.capacity
+
+    def places(self) -> Samples:
+        """Return where the image has the outlines."""
+        self.measure.error(self.points)
+        return self.measure.places(self.points)
+
+    def advance(self, steps: int) -> None:
+        damping = np.full(len(self._following), DAMPING)
+        failures, gradient, idle = 0, None, 0
+        at = self.points
+        near = self.measure.surroundings(self.points)
+        around = near.sums(self.measure.squares)
+        for done in range(1, steps + 1):
+            if gradient is None:
+                gradient = self.measure.gradient()
+                freedom = self._constraints.freedom(at)
+                if (done-1)%HS==0:
+                    self.measure.look()
+                if True:
+                    bending = Bending(self.measure.samples(at), self._following)
+            least = self.measure.least
+            change = newton_step(bending, freedom, gradient, damping, least)
+            change = np.clip(change, -MOST_STEP, MOST_STEP)
+            points = self._constraints.project(at + freedom.times(change).reshape(-1, 2))
+            error = self.measure.error(points)
+            now = near.sums(self.measure.squares)
+            damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), np.clip(WILDER * damping, RAISED, 100.0))
+            gain = 1 - error / max(self.error, 1e-12)
+            if DEBUG:
+                print(f"  step {done}: {self.error:.3e} -> {error:.3e} worse {(now>around).mean():.2f} damping {np.median(damping):.2g} {damping.max():.2g}")
+            idle = 0 if gain >= LEAST_GAIN else idle + 1
+            at, around, gradient = points, now, None
+            if gain > 0:
+                self.points, self.error = points, error
+            if self._run.on_progress:
+                self._report(done, steps)
+            if idle >= MOST_FAILURES or self._run.over():
+                break
+
+    def _report(self, done: int, steps: int) -> None:
+        pass
+
+
+DEBUG = False
 
 
 def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
@@ -133,59 +149,3 @@ def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
     if canvas.background is None and target.shape[2] == 3:
         return np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     return target
-
-
-def start(
-    target: FloatArray,
-    drawing: Drawing,
-    backend: Backend,
-    how: Refinement,
-    held: npt.NDArray[np.bool_] | None = None,
-    capacity: Capacity | None = None,
-) -> Step:
-    """Return a step for ``drawing``, its points projected onto the constraints; ``held`` ones stay there.
-
-    ``capacity``: of the renderer to begin with; the first evaluation enlarges it if need be.
-    """
-    state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
-    projection = Projection(Constraints.of(drawing), state.parameters, held)
-    projection.project()
-    state.projection = projection
-    every = np.ones(len(drawing.scene), np.bool_)
-    state.parameters.hold("opacities", every)
-    state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))
-    if how.colors == "held":
-        state.parameters.hold("colors", every)
-        state.parameters.keeps_colors = True
-    height, width = target.shape[:2]
-    goal = Target(target, Phase(width, height, slack=1.0))
-    return Step(state, how.settings(drawing.scene), goal, capacity=capacity)
-
-
-def _evaluate(step: Step) -> tuple[Scene, float]:
-    """Return the scene and its mean squared error."""
-    step.render()
-    return step.state.scene(), step.measured_error()
-
-
-def own_colors(scene: Scene, target: FloatArray) -> FloatArray:
-    """Return the colours of the shapes, snapped to the image's 8-bit colours, shape (shape, 3).
-
-    A colour is snapped to the most frequent one near it, unless many others lie near as well: then the fitted
-    mean is better.
-    """
-    pixels = target.reshape(-1, target.shape[2])
-    if target.shape[2] == 4:
-        pixels = pixels[pixels[:, 3] > 1 - 0.5 / 255][:, :3]
-    levels, counts = np.unique(np.round(pixels * 255).astype(np.uint8), axis=0, return_counts=True)
-    palette = levels.astype(np.float32) / np.float32(255)
-    colors = scene.colors.copy()
-    for i, color in enumerate(scene.colors):
-        near = np.flatnonzero((np.abs(palette - color) <= SNAP_DISTANCE).all(axis=1))
-        if len(near):
-            most = near[counts[near].argmax()]
-            if counts[most] >= SNAP_SHARE * counts[near].sum():
-                colors[i] = palette[most]
-                continue
-        colors[i] = np.round(color * 255) / 255
-    return colors

@@ -15,7 +15,7 @@ from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
-from warpsplat.fit.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.fit.loop import Fit, Start, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import finest
@@ -176,7 +176,7 @@ def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -
         ink = np.zeros((*near.shape, 4), np.float32)
         ink[..., 3] = np.where(near, traced.areas.cover, 0)
         found = trace(ink)
-        drawing = Drawing(found.scene, found.joints, found.same)
+        drawing = Drawing(found.scene, found.joints)
         part = run.part(number / len(pens), (number + 1) / len(pens))
         done = finish_drawing(ink, drawing, part, finest=finest, tidy=tidy)
         shapes, count = done.drawing.scene, len(done.drawing.scene)
