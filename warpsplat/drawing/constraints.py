@@ -1,4 +1,4 @@
-"""What holds a drawing's outlines together: straight lines, smooth joints, level and upright parts, borders."""
+"""What holds a drawing's outlines together: lines, smooth joints, level and upright parts, borders."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
+from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import ranges
 
@@ -52,7 +52,7 @@ class Drawing:
         return Drawing(self.scene.take(index), self.joints[points])
 
     def following(self) -> Links:
-        """Return the cubic that follows each one on its contour, shape (cubic,); cubic i begins at point 3 i."""
+        """Return the cubic after each one on its contour, shape (cubic,); cubic i begins at point 3 i."""
         starts = self.scene.starts.astype(np.intp) // 3
         after = np.arange(1, starts[-1] + 1)
         filled = starts[1:] > starts[:-1]
@@ -73,6 +73,11 @@ def with_ends(points: Floats, following: Links) -> Floats:
     """Return the control points of the cubics on closed contours, shape (cubic, 4, 2)."""
     begun = points.reshape(-1, 3, 2)
     return np.concatenate([begun, begun[following, :1]], axis=1)
+
+
+def summed(index: Links, values: Floats, count: int) -> Floats:
+    """Return the sums of ``values`` by ``index``, shape (count,)."""
+    return np.bincount(index, values, count).astype(np.float64, copy=False)
 
 
 class Constraints:
@@ -123,17 +128,16 @@ class Constraints:
         """Name each coordinate by a number, equal ones by the same."""
         count = len(tied)
         names = np.arange(6 * count).reshape(count, 3, 2)
-        while True:
-            first = np.minimum(names[:, 0], names[self._next, 0])
-            if not (tied & (names[:, 0] != names[self._next, 0])).any():
-                break
-            names[:, 0] = np.where(tied, first, names[:, 0])
-            for axis in (0, 1):
-                here = np.flatnonzero(tied[:, axis])
-                names[self._next[here], 0, axis] = first[here, axis]
+        for axis in (0, 1):
+            here = np.flatnonzero(tied[:, axis])
+            ends = np.stack([here, self._next[here]])
+            while (names[ends[0], 0, axis] != names[ends[1], 0, axis]).any():
+                least = names[ends, 0, axis].min(axis=0)
+                for end in ends:  # a point ends one line at the most, and begins one
+                    names[end, 0, axis] = np.minimum(names[end, 0, axis], least)
         for side, (owner, handle) in enumerate(((self._previous, 2), (np.arange(count), 1))):
-            joint, axis = np.nonzero(self._level & self._free[:, side, None])
-            names[owner[joint], handle, axis] = names[joint, 0, axis]
+            joint, axes = np.nonzero(self._level & self._free[:, side, None])
+            names[owner[joint], handle, axes] = names[joint, 0, axes]
         self._name = names.ravel()
 
     def _handles(self, side: int) -> tuple[Links, Links]:
@@ -164,7 +168,7 @@ class Constraints:
         axis = np.where(free[:, :1], axis, p - begun[before, 0])
         axis = np.where(free[:, 1:], axis, begun[after, 0] - p)
         length = np.linalg.norm(axis, axis=1)[:, None]
-        return np.where(length > MIN_LENGTH, axis / np.maximum(length, MIN_LENGTH), 0.0)
+        return np.asarray(np.where(length > MIN_LENGTH, axis / np.maximum(length, MIN_LENGTH), 0.0))
 
     def project(self, points: Floats) -> Floats:
         """Return ``points``, shape (point, 2), with the constraints kept exactly."""
@@ -175,7 +179,8 @@ class Constraints:
             joints, handles = self._handles(side)
             p, u = points[3 * joints], along[joints]
             length = np.maximum(sign * ((points[handles] - p) * u).sum(axis=1), MIN_HANDLE)
-            points[handles] = np.where(u.any(axis=1)[:, None], p + sign * length[:, None] * u, points[handles])
+            known = u.any(axis=1)
+            points[handles[known]] = (p + sign * length[:, None] * u)[known]
         begun = points.reshape(-1, 3, 2)
         a, b = begun[self._is_line, 0], begun[self._next[self._is_line], 0]
         begun[self._is_line, 1:] = np.stack([a + (b - a) / 3, b - (b - a) / 3], axis=1)
@@ -191,7 +196,7 @@ class Constraints:
         entries.append((rows, self._name[rows], np.ones(len(rows))))
 
         def add(target: Links, source: Links, values: Floats) -> None:
-            """Points ``target`` depend on points ``source``, by axes: values (point, 2, 2) or one for both."""
+            """Let points ``target`` depend on ``source``: values (point, 2, 2) by axes, or one for both."""
             for i in (0, 1):
                 for j in (0, 1):
                     if values.ndim == 3 or i == j:
@@ -207,7 +212,9 @@ class Constraints:
         lengths = np.zeros((len(points) // 3, 2))
         for side, sign in ((0, -1.0), (1, 1.0)):
             joints, handles = self._handles(side)
-            lengths[joints, side] = sign * ((points[handles] - points[3 * joints]) * along[joints]).sum(axis=1)
+            lengths[joints, side] = sign * ((points[handles] - points[3 * joints]) * along[joints]).sum(
+                axis=1
+            )
         for side, sign in ((0, -1.0), (1, 1.0)):
             joints, handles = self._handles(side)
             u = along[joints]
@@ -247,8 +254,8 @@ class Freedom:
 
     def times(self, numbers: Floats) -> Floats:
         """Return the change of the coordinates, shape (size,)."""
-        return np.bincount(self.row, self.value * numbers[self.column], self.size)
+        return summed(self.row, self.value * numbers[self.column], self.size)
 
     def adjoint(self, coordinates: Floats) -> Floats:
         """Return the transposed matrix times ``coordinates``."""
-        return np.bincount(self.column, self.value * coordinates[self.row], self.size)
+        return summed(self.column, self.value * coordinates[self.row], self.size)

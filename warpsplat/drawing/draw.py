@@ -8,12 +8,12 @@ from functools import partial
 import numpy as np
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import matching
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.drawing.constraints import Drawing
 from warpsplat.fit.export import finished
 from warpsplat.fit.loop import Fit
 from warpsplat.fit.palette import Palette, solid_shapes

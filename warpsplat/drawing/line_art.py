@@ -8,6 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
 from warpsplat.drawing.strokes.tour import toured
@@ -15,7 +16,6 @@ from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
-from warpsplat.drawing.constraints import Drawing
 from warpsplat.fit.loop import Fit, Start, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import finest

@@ -7,16 +7,16 @@ and of each channel of the image the contrast.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat.alpha import squares
-from warpsplat.drawing.constraints import Drawing, Floats, Links, with_ends
+from warpsplat.drawing.constraints import Drawing, Floats, Links, summed, with_ends
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
-from warpsplat.rendering.outline import Outline
+from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import TILE, to_tiles
@@ -28,13 +28,13 @@ GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
 FARTHEST = 1.5
 """How far from an outline the image can have it: beyond, it is not this outline [px]."""
 
-LEAST_WEIGHT = 1e-4
-"""Contrast squared, of a channel's range, below which an outline is not seen."""
+LEAST_CONTRAST, FAINT, HIDDEN = 1e-4, 0.01, 0.1
+"""Squares of the contrast below which an outline is not seen, that the faintest seen ones count as, and that
+those count as which are not seen: if they move, what they hide may show."""
 
+MARGIN = 4
+"""How far from the outlines the error is followed, at least [px]."""
 
-import os
-FLOOR=float(os.environ.get("FL","0.003"))
-HIDDEN=float(os.environ.get("HI","0.1"))
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -46,7 +46,7 @@ class Samples:
     """Where on it, shape (sample,)."""
     place: Floats
     """Where the image has the outline, shape (sample, 2)."""
-    normal: Floats
+    across: Floats
     """Unit vectors across the outline, shape (sample, 2)."""
     weight: Floats
     """By how much the mean squared error grows for each square of the distance across, shape (sample,)."""
@@ -62,8 +62,14 @@ def bernstein(t: Floats) -> Floats:
     return np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=-1)
 
 
+def slopes_at(cubics: Floats, t: Floats) -> Floats:
+    """Return the derivatives by ``t`` of cubics, shape (sample, 4, 2), at ``t``, shape (sample,)."""
+    legs, s, u = 3 * np.diff(cubics, axis=1), (1 - t)[:, None], t[:, None]
+    return np.asarray(s * s * legs[:, 0] + 2 * s * u * legs[:, 1] + u * u * legs[:, 2])
+
+
 class Surroundings:
-    """The pixels around each cubic."""
+    """The pixels around each cubic, and the tiles that have some."""
 
     def __init__(self, cubics: Floats, viewport: Viewport) -> None:
         """``cubics``: shape (cubic, 4, 2) [px]."""
@@ -72,66 +78,85 @@ class Surroundings:
         which = np.repeat(np.arange(len(cubics)), counts)
         number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
         t = (number + 0.5) / counts[which]
-        points = (bernstein(t)[..., None] * cubics[which]).sum(axis=1)
-        x, y = np.floor(points).astype(np.intp).T
-        wide, high, every = viewport.width + 2, viewport.height + 2, 9 * len(which)
+        x, y = np.floor((bernstein(t)[..., None] * cubics[which]).sum(axis=1)).astype(np.intp).T
+        limits = np.array([viewport.width, viewport.height])
+        corners = np.stack(
+            [np.stack([x + i, y + j], axis=1) for i in (-MARGIN, MARGIN) for j in (-MARGIN, MARGIN)]
+        )
+        column, row = np.clip(corners.reshape(-1, 2), 0, limits - 1).T // TILE
+        self.tiles: Links = np.unique(row * viewport.tiles_x + column)
+        wide, high = limits + 2
         x, y = np.clip(x + 1, 0, wide - 1), np.clip(y + 1, 0, high - 1)
         middle = np.unique((which * high + y) * wide + x)
-        offsets = np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)])
-        near = np.unique((middle[:, None] + offsets).ravel())
-        self._cubic, place = near // (wide * high), near % (wide * high)
-        x, y = place % wide - 1, place // wide - 1
+        near = np.unique(middle[:, None] + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)]))
+        x, y = near % wide - 1, near % (wide * high) // wide - 1
         inside = (x >= 0) & (x < viewport.width) & (y >= 0) & (y < viewport.height)
-        self._cubic, x, y = self._cubic[inside], x[inside], y[inside]
-        tile = y // TILE * viewport.tiles_x + x // TILE
+        near, x, y = near[inside], x[inside], y[inside]
+        self._cubic, self._count = near // (wide * high), len(cubics)
+        tile = np.searchsorted(self.tiles, y // TILE * viewport.tiles_x + x // TILE)
         self._pixel = (tile * TILE + x % TILE) * TILE + y % TILE
-        self._count = len(cubics)
 
     def sums(self, pixels: FloatArray) -> Floats:
-        """Return sums of ``pixels``, by tiles, around each cubic, shape (cubic,)."""
-        return np.bincount(self._cubic, pixels.ravel()[self._pixel], self._count)
+        """Return sums of ``pixels`` of ``tiles`` around each cubic, shape (cubic,)."""
+        return summed(self._cubic, pixels.ravel()[self._pixel], self._count)
 
 
 class Measure:
     """Renders outlines of a drawing over and over and compares them with an image."""
 
     def __init__(
-        self, target: FloatArray, drawing: Drawing, backend: Backend, capacity: Capacity | None = None
+        self,
+        target: FloatArray,
+        drawing: Drawing,
+        points: Floats,
+        backend: Backend,
+        capacity: Capacity | None = None,
     ) -> None:
-        """``target``: as ``finish_drawing`` has it; ``capacity``: of the renderer, if it is known."""
+        """``points``: where the outlines begin; ``capacity``: of the renderer, if it is known."""
         self._following = drawing.following()
         self._parameters = Parameters(drawing.scene, backend)
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
         self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
-        self._target, self._viewport = to_tiles(target), viewport
         self._scale = 1 / (3 * viewport.pixel_count)
-        self.least = LEAST_WEIGHT * self._scale
-        self.scene = drawing.scene
+        self.least = LEAST_CONTRAST * self._scale
+        """Curvature that does not count."""
+        self._near = Surroundings(with_ends(points, self._following), viewport)
+        self._tiles = self._near.tiles
+        goal = to_tiles(target)
+        self._target = goal[self._tiles]
+        self._inside = self._renderer.film.buffers.inside.numpy()[self._tiles, None]
+        self._grad = np.zeros_like(goal)
+        self._render(points)
+        elsewhere = np.ones(len(goal), np.bool_)
+        elsewhere[self._tiles] = False
+        film = self._renderer.film.buffers
+        rest = (film.image.numpy()[elsewhere] - goal[elsewhere]) * film.inside.numpy()[elsewhere, None]
+        self._rest = float(squares(rest, axis=1).sum(dtype=np.float64))
 
     @property
     def capacity(self) -> Capacity:
         """Capacity of the renderer's arrays."""
         return self._renderer.capacity
 
-    def error(self, points: Floats) -> float:
-        """Return the mean squared error with the outlines at ``points``."""
-        self.scene = replace(self.scene, points=points.astype(np.float32))
-        self._parameters.groups["points"].value.assign(self.scene.points)
+    def _render(self, points: Floats) -> None:
+        self._parameters.groups["points"].value.assign(points.astype(np.float32))
         self._renderer.forward_complete()
         self._is_fresh = True
-        film = self._renderer.film.buffers
-        self._residual = (film.image.numpy() - self._target) * film.inside.numpy()[:, None]
-        self.squares = squares(self._residual, axis=1)
-        return float(self.squares.sum(dtype=np.float64)) * self._scale
 
-    def surroundings(self, points: Floats) -> Surroundings:
-        """Return the pixels around the outlines at ``points``."""
-        return Surroundings(with_ends(points, self._following), self._viewport)
+    def error(self, points: Floats) -> tuple[float, Floats]:
+        """Return the mean squared error with the outlines at ``points``, and the part around each cubic."""
+        self._render(points)
+        self._residual = (
+            self._renderer.film.buffers.image.numpy()[self._tiles] - self._target
+        ) * self._inside
+        parts = squares(self._residual, axis=1)
+        total = self._rest + float(parts.sum(dtype=np.float64))
+        return total * self._scale, self._near.sums(parts) * self._scale
 
     def gradient(self) -> Floats:
-        """Return the derivative of the last ``error`` by the coordinates of the points, shape (2 x point,)."""
-        self._back(self._by_image(self._residual))
+        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,)."""
+        self._back(self._by_image())
         return self._parameters.arrays["points_grad"].numpy().astype(np.float64).ravel()
 
     def look(self) -> None:
@@ -142,39 +167,42 @@ class Measure:
         for channel in self._channels():
             self._back(channel)
             square += ((self._piece_grads(vertex).sum(axis=1) * normal).sum(axis=1) / length) ** 2
-        self._contrast = np.where(square > LEAST_WEIGHT, np.maximum(square, FLOOR), HIDDEN) * self._scale
-        self._cubic = cubic
+        seen = square > LEAST_CONTRAST
+        self._contrast = np.where(seen, np.maximum(square, FAINT), HIDDEN) * self._scale
+        self._counts = np.bincount(cubic, minlength=len(self._following))
 
-    def samples(self, points: Floats) -> Samples:
-        """Return samples of the outlines at ``points``, without places."""
-        cubic = self._cubic
-        pieces = np.bincount(cubic, minlength=len(points) // 3)
-        number = np.arange(len(cubic)) - (np.cumsum(pieces) - pieces)[cubic]
-        t = ((number[:, None] + GAUSS) / pieces[cubic][:, None]).ravel()
-        cubics = with_ends(points, self._following)
-        cubic = np.repeat(cubic, 2)
-        slopes = 3 * np.diff(cubics, axis=1)[cubic]
-        s = (1 - t)[:, None]
-        ahead = s * s * slopes[:, 0] + 2 * s * t[:, None] * slopes[:, 1] + (t * t)[:, None] * slopes[:, 2]
+    def samples(self, points: Floats, counts: Links | None = None) -> Samples:
+        """Return samples of the outlines at ``points``, on themselves.
+
+        ``counts``: pieces of the cubics, two samples on each; without, as they were looked at.
+        """
+        counts = self._counts if counts is None else counts
+        cubic = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(cubic)) - (np.cumsum(counts) - counts)[cubic]
+        t = ((number[:, None] + GAUSS) / counts[cubic][:, None]).ravel()
+        known = (2 * number + 1) * self._counts[cubic] // (2 * counts[cubic])
+        contrast = self._contrast[(np.cumsum(self._counts) - self._counts)[cubic] + known]
+        weight = np.repeat(contrast * 0.5 / counts[cubic], 2)
+        cubics, cubic = with_ends(points, self._following), np.repeat(cubic, 2)
+        ahead = slopes_at(cubics[cubic], t)
         speed = np.linalg.norm(ahead, axis=1)
         normal = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.maximum(speed, 1e-9)[:, None]
-        weight = np.repeat(self._contrast, 2) * speed * (0.5 / pieces)[cubic]
         where = (bernstein(t)[..., None] * cubics[cubic]).sum(axis=1)
-        return Samples(cubic, t, where, normal, weight)
+        return Samples(cubic, t, where, normal, weight * speed)
 
     def places(self, points: Floats) -> Samples:
-        """Return samples of the outlines at ``points``, those of the last ``error``, where the image has them."""
-        self.look()
-        self._back(self._by_image(self._residual))
-        _, _, vertex, following = self._pieces()
-        normal, length = self._across(vertex, following)
+        """Return samples at ``points``, those of the last ``error``, where the image has outlines."""
+        self._back(self._by_image())
+        cubic, _, vertex, following = self._pieces()
+        normal, _ = self._across(vertex, following)
         slope = (self._piece_grads(vertex) * normal[:, None]).sum(axis=2)
+        found = self.samples(points, np.bincount(cubic, minlength=len(self._following)))
         # A distance that is linear along the piece has these ends, and these values at the samples.
-        ends = slope / (self._contrast * length)[:, None]
-        ends = -np.stack([2 * ends[:, 0] - ends[:, 1], 2 * ends[:, 1] - ends[:, 0]], axis=1)
+        weight = np.maximum(found.weight.reshape(-1, 2).sum(axis=1), 1e-30)
+        ends = -np.stack([2 * slope[:, 0] - slope[:, 1], 2 * slope[:, 1] - slope[:, 0]], axis=1)
+        ends /= weight[:, None]
         away = np.clip(ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * GAUSS, -FARTHEST, FARTHEST)
-        found = self.samples(points)
-        return replace(found, place=found.place + away.reshape(-1, 1) * found.normal)
+        return replace(found, place=found.place + away.reshape(-1, 1) * found.across)
 
     def _across(self, vertex: Links, following: Links) -> tuple[Floats, Floats]:
         """Return unit normals and lengths of straight pieces."""
@@ -184,19 +212,17 @@ class Measure:
         return np.stack([-edge[:, 1], edge[:, 0]], axis=1) / length[:, None], length
 
     @property
-    def _outline(self) -> "OutlineBuffers":
+    def _outline(self) -> OutlineBuffers:
         geometry = self._renderer.geometry
         assert isinstance(geometry, Outline)
         return geometry.buffers
 
     def _pieces(self) -> tuple[Links, Links, Links, Links]:
-        """Return cubic, number in it, first and second vertex of the straight pieces that are drawn."""
+        """Return cubic, number in it, first and second vertex of the straight pieces."""
         b, arrays = self._outline, self._parameters.arrays
-        counts, first = b.bezier_pieces.numpy(), b.bezier_vertex.numpy()
+        counts = b.bezier_pieces.numpy().astype(np.intp)
         shape = arrays["contour_shape"].numpy()[arrays["bezier_contour"].numpy()]
-        base = b.vertex_first.numpy()[shape] + first
-        drawn = (b.vertex_last.numpy() > b.vertex_first.numpy())[shape]
-        counts = np.where(drawn, counts, 0).astype(np.intp)
+        base = b.vertex_first.numpy()[shape] + b.bezier_vertex.numpy()
         cubic = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(cubic)) - np.repeat(np.cumsum(counts) - counts, counts)
         vertex = base[cubic] + number
@@ -213,27 +239,26 @@ class Measure:
         if not self._is_fresh:
             self._renderer.forward()
         self._is_fresh = False
-        self._renderer.film.buffers.image_grad.assign(image_grad)
+        self._grad[self._tiles] = image_grad
+        self._renderer.film.buffers.image_grad.assign(self._grad)
         self._renderer.backward()
 
-    def _by_image(self, residual: FloatArray) -> FloatArray:
+    def _by_image(self) -> FloatArray:
         """Return the derivative of the mean squared error by the image."""
-        if residual.shape[1] == 3:
-            return residual * np.float32(2 * self._scale)
-        color, opacity = residual[:, :3], residual[:, 3:]
+        if self._residual.shape[1] == 3:
+            return self._residual * np.float32(2 * self._scale)
+        color, opacity = self._residual[:, :3], self._residual[:, 3:]
         back = 3 * opacity - color.sum(axis=1, keepdims=True)
         return np.concatenate([2 * color - opacity, back], axis=1) * np.float32(self._scale)
 
-    def _channels(self) -> list[FloatArray]:
-        """Return gradients of the image whose squares are those of the error: r - a/2, ... and a by sqrt 3/4."""
-        found = []
+    def _channels(self) -> Iterator[FloatArray]:
+        """Yield gradients of the image whose squares add up to the squared error's.
+
+        With opacity a, on black and on white, they are r - a/2, g - a/2, b - a/2 and a by the root of 3/4.
+        """
         planes = self._residual.shape[1]
         for channel in range(planes):
-            grad = np.zeros_like(self._residual)
-            grad[:, channel] = self._renderer.film.buffers.inside.numpy()
-            if planes == 4 and channel < 3:
-                grad[:, 3] = -0.5
-            elif planes == 4:
-                grad[:, 3] = np.sqrt(np.float32(0.75))
-            found.append(grad)
-        return found
+            shares = np.eye(planes, dtype=np.float32)[channel]
+            if planes == 4:
+                shares[3] = -0.5 if channel < 3 else np.sqrt(np.float32(0.75))
+            yield shares[None, :, None, None] * self._inside

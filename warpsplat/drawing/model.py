@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, with_ends
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, summed, with_ends
 from warpsplat.drawing.measure import Samples, bernstein
 from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits
 from warpsplat.drawing.solve import Bending, newton_step
@@ -42,7 +42,6 @@ def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
     previous = np.empty_like(following)
     previous[following] = np.arange(count)
     before, after = previous[edits.at], following[edits.at]
-    first = np.where(np.isin(edits.kind, (STRAIGHT, )), edits.at, before)
     cubic = np.stack([cubics[before], cubics[edits.at], cubics[after]], axis=1)
     kind = edits.kind
     made = np.flatnonzero(kind == WITHOUT)
@@ -56,13 +55,16 @@ def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
         for corner in corners:
             cubic[rows, k, corner, axis] = value
     ends = cubic[rows, 1][:, [0, 3]]
-    cubic[rows, 1, 1], cubic[rows, 1, 2] = (2 * ends[:, 0] + ends[:, 1]) / 3, (ends[:, 0] + 2 * ends[:, 1]) / 3
+    cubic[rows, 1, 1], cubic[rows, 1, 2] = (
+        (2 * ends[:, 0] + ends[:, 1]) / 3,
+        (ends[:, 0] + 2 * ends[:, 1]) / 3,
+    )
     rows = np.flatnonzero(kind == TANGENT)
     value = cubic[rows, 1, 0, edits.axis[rows]]
     cubic[rows, 0, 2, edits.axis[rows]] = cubic[rows, 1, 1, edits.axis[rows]] = value
     growth = np.zeros(len(kind))
     bounds = np.searchsorted(samples.cubic, np.arange(count + 1))
-    old = np.bincount(samples.cubic, errors(samples, cubics), count)
+    old = summed(samples.cubic, errors(samples, cubics), count)
     first_length, second_length = (chords(cubics[rows]) for rows in (before, edits.at))
     share = first_length / np.maximum(first_length + second_length, 1e-9)
     for k, rows in enumerate((before, edits.at, after)):
@@ -76,7 +78,7 @@ def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
             inside = t * share[which] if k == 0 else share[which] + t * (1 - share[which])
             t = np.where(joined, inside, t)
         part = placed(replace(part, cubic=which, t=t), cubic[:, k])
-        growth += np.bincount(which, errors(part, cubic[:, k]), len(kind)) - old[rows]
+        growth += summed(which, errors(part, cubic[:, k]), len(kind)) - old[rows]
     return growth
 
 
@@ -88,7 +90,7 @@ def chords(cubics: Floats) -> Floats:
 def errors(samples: Samples, cubics: Floats) -> Floats:
     """Return the errors of the samples on ``cubics``."""
     at = (bernstein(samples.t)[..., None] * cubics[samples.cubic]).sum(axis=1)
-    return np.asarray(samples.weight * ((at - samples.place) * samples.normal).sum(axis=1) ** 2)
+    return np.asarray(samples.weight * ((at - samples.place) * samples.across).sum(axis=1) ** 2)
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
@@ -123,5 +125,5 @@ def fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Drawing, S
         change = np.clip(newton_step(bending, freedom, gradient, damping, least), -1, 1)
         points = constraints.project(points + freedom.times(change).reshape(-1, 2))
         samples = placed(samples, with_ends(points, following))
-    found = np.bincount(samples.cubic, errors(samples, with_ends(points, following)), len(following))
+    found = summed(samples.cubic, errors(samples, with_ends(points, following)), len(following))
     return replace(drawing, scene=replace(drawing.scene, points=points.astype(np.float32))), samples, found

@@ -7,6 +7,7 @@ All are found at once, as arrays. How much each costs is told by what the image 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -67,10 +68,10 @@ class Outlines:
         edits = Edits(**{name: np.concatenate([vars(part)[name] for part in found]) for name in names})
         return edits.take(~refused[edits.at, edits.kind])
 
-    def _edits(self, kind: int, at: Links, saved: npt.NDArray[np.intp] | int, **known: Floats | Links) -> Edits:
+    def _edits(self, kind: int, at: Links, saved: npt.NDArray[np.intp] | int, **known: Any) -> Edits:
         before, after = self._previous[at], self._next[at]
         far = self._previous[before] if kind == WITHOUT else before
-        values = {
+        values: dict[str, Any] = {
             "handles": np.zeros((len(at), 2, 2)),
             "axis": np.zeros(len(at), np.intp),
             "value": np.zeros(len(at)),

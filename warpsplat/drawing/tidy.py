@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from warpsplat.drawing import model
-from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing, summed
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
-from warpsplat.drawing.nodes import Outlines, applied, apart
+from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
+from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
@@ -28,6 +29,9 @@ that nobody would miss."""
 
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
+
+MEASURED_GRIDS = 2.0, DRAFT_GRID
+"""View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
 
 WORTHWHILE = 0.004
 """Least share of the file's bytes that a round saves for another one to follow."""
@@ -71,19 +75,16 @@ def finish_drawing(
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
-    fit = OutlineFit(target, drawing, run.part(0.0, FIRST_END))
-    fit.advance(FIRST_STEPS)
+    fit = OutlineFit(target, drawing, run)
+    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, price), run.part(FIRST_END, SECOND_END), capacity=fit.capacity)
-        fit.advance(SECOND_STEPS)
-    drawing = fit.drawing
+        fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
+        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
     grid = drawing_grid(fit, finest, price)
-    low = rounded(drawing.scene, grid).points
-    points = np.where((np.arange(len(low)) % 3 == 0)[:, None], low, drawing.scene.points)
-    drawing = replace(drawing, scene=replace(drawing.scene, points=points))
-    held = np.ones(len(low) // 3, np.bool_)
-    fit = OutlineFit(target, drawing, run.part(SECOND_END, 1.0), held, fit.capacity)
-    fit.advance(THIRD_STEPS)
+    on = np.arange(len(fit.points)) % 3 == 0
+    low = rounded(fit.drawing.scene, grid).points
+    fit.hold(np.where(on[:, None], low, fit.points), on[on])
+    fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
     drawing = fit.drawing
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
 
@@ -95,9 +96,9 @@ def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
     that they are; each edit is judged by what is left around it, and if some cost too much, the others are
     made without them. ``price``: see ``finish_drawing``.
     """
-    drawing, least = fit.drawing, fit.measure.least
+    drawing, least = fit.drawing, fit.least
     samples = fit.places()
-    errors = np.bincount(samples.cubic, model.errors(samples, drawing.cubics()), len(drawing.joints) // 3)
+    errors = summed(samples.cubic, model.errors(samples, drawing.cubics()), len(drawing.joints) // 3)
     rest = fit.error - errors.sum()
     size = first = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
     refused = np.zeros((len(errors), 4), np.bool_)
@@ -133,10 +134,14 @@ def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    worth = price * byte_worth(max(fit.error, LEAST_ERROR), len(write_svg(scene, per_pixel=DRAFT_GRID)))
+    coarse, fine = (len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS)
+    worth = price * byte_worth(max(fit.error, LEAST_ERROR), fine)
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
         loss = float(model.errors(samples, low.cubics()).sum() - before)
-        costs[grid] = 2 * STAGED_COST * loss + worth * len(write_svg(low.scene, per_pixel=grid))
+        doublings = elementary.log2(grid / MEASURED_GRIDS[0]) / elementary.log2(
+            MEASURED_GRIDS[1] / MEASURED_GRIDS[0]
+        )
+        costs[grid] = 2 * STAGED_COST * loss + worth * (fine - coarse) * doublings
     return min(costs, key=costs.__getitem__)
