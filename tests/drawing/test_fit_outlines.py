@@ -134,6 +134,8 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
     for keeps in (False, True):
         state = FitState.start(made.scene, Backend.on(device, 1), np.random.default_rng(0))
         state.parameters.keeps_colors = keeps
+        for name in ("colors", "opacities"):
+            state.parameters.hold(name, np.ones(len(made.scene), np.bool_))
         settings = make_settings(texture=0.0, bending=0.0, rates={"points": 0.9, "colors": 0.0})
         settings = replace(settings, coarse=0.0, density=Density(interval=0))
         step = Step(state, settings, Target(target, Phase(96, 80, slack=1.0)))

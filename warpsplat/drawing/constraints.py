@@ -89,7 +89,7 @@ class Constraints:
     """
 
     def __init__(self, drawing: Drawing, held: Flags | None = None) -> None:
-        """``held``: points on the outlines that stay where they are, by cubic, shape (cubic,)."""
+        """``held``: points that stay where they are, shape (point,)."""
         scene = drawing.scene
         points = scene.points.astype(np.float64).reshape(-1, 3, 2)
         count = len(points)
@@ -103,8 +103,9 @@ class Constraints:
         self._name_coordinates(tied)
         size = np.array([scene.canvas.width, scene.canvas.height])
         pinned = np.minimum(np.abs(points), np.abs(points - size)) < SAME_COORDINATE
-        if held is not None:
-            pinned[held, 0] = True
+        self._held = np.zeros(3 * count, np.bool_) if held is None else held
+        self._places = points.reshape(-1, 2)[self._held]
+        pinned |= self._held.reshape(-1, 3, 1)
         pinned[self._is_line, 1:] = False
         pinned.reshape(-1, 2)[self._directed()] = False
         self._pinned = np.zeros(6 * count, np.bool_)
@@ -184,6 +185,7 @@ class Constraints:
         begun = points.reshape(-1, 3, 2)
         a, b = begun[self._is_line, 0], begun[self._next[self._is_line], 0]
         begun[self._is_line, 1:] = np.stack([a + (b - a) / 3, b - (b - a) / 3], axis=1)
+        points[self._held] = self._places
         return points
 
     def freedom(self, points: Floats) -> Freedom:
@@ -239,7 +241,7 @@ class Constraints:
             add(h, 3 * end, turning)
             add(h, 3 * begin, -turning)
         parts = [np.concatenate(part) for part in zip(*entries, strict=True)]
-        kept = ~self._pinned[parts[1]]
+        kept = ~(self._pinned[parts[1]] | self._held[parts[0] // 2])
         return Freedom(parts[0][kept], parts[1][kept], parts[2][kept], 2 * len(points))
 
 

@@ -89,8 +89,9 @@ class OutlineFit:
         return self._measure.places(self.points)
 
     def hold(self, points: Floats, held: Flags) -> None:
-        """Begin again at ``points``; those where the cubics ``held`` begin stay there from now on."""
-        self._constraints = Constraints(self._drawing, held)
+        """Begin again at ``points``; those that are ``held``, shape (point,), stay there from now on."""
+        drawing = replace(self._drawing, scene=replace(self._drawing.scene, points=points.astype(np.float32)))
+        self._constraints = Constraints(drawing, held)
         self.points = self._constraints.project(points)
         self.error, self._around = self._measure.error(self.points)
 

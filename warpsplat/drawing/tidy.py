@@ -7,14 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from warpsplat.alpha import squares
 from warpsplat.drawing import model
-from warpsplat.drawing.constraints import Drawing, summed
+from warpsplat.drawing.cells import by_cell
+from warpsplat.drawing.constraints import Constraints, Drawing, Floats, summed
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
+from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
 from warpsplat.portable import elementary
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.renderer import render
+from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
+from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 ROUNDS = 16
@@ -80,13 +87,35 @@ def finish_drawing(
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
         fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+    if tidy:
+        exact = with_exact_shapes(target, fit.drawing, run.backend, price)
+        if exact is not None:
+            fit = OutlineFit(target, exact, run, fit.capacity)
     grid = drawing_grid(fit, finest, price)
-    on = np.arange(len(fit.points)) % 3 == 0
-    low = rounded(fit.drawing.scene, grid).points
-    fit.hold(np.where(on[:, None], low, fit.points), on[on])
+    low = rounded(fit.drawing.scene, grid)
+    held = held_rounds(low, grid)
+    held[::3] = True
+    fit.hold(np.where(held[:, None], low.points, fit.points), held)
     fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
     drawing = fit.drawing
     return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+
+
+def with_exact_shapes(target: FloatArray, drawing: Drawing, backend: Backend, price: float) -> Drawing | None:
+    """Return a drawing with exact basic shapes (``with_shapes``); None: there are none."""
+
+    def errors_of(made: Drawing) -> Floats:
+        points = Constraints(made).project(made.cubics()[:, :3].reshape(-1, 2))
+        scene = replace(made.scene, points=points.astype(np.float32))
+        away = squares(render(scene, backend=backend) - target)
+        viewport = Viewport(target.shape[1], target.shape[0])
+        return by_cell(to_tiles(away[..., None])[:, 0], viewport) / (3 * viewport.pixel_count)
+
+    errors = errors_of(drawing)
+    size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
+    worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
+    made = with_shapes(target, drawing, errors_of, errors, worth)
+    return None if made is drawing else made
 
 
 def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:

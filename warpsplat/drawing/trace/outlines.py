@@ -19,6 +19,7 @@ PURE = 0.02  # share of the other region up to which a pixel is not mixed
 FOREIGN = (
     20.0  # [levels] distance of a pixel from any mixture of the two, from which on it has a third colour
 )
+SOFT = 6  # cracks ahead and behind whose mean is a point between two steps of smooth shading
 TREND = 3  # cracks ahead and behind that tell the direction of an outline
 
 
@@ -42,6 +43,12 @@ def find_boundary(loops: Loops, regions: Regions) -> Boundary:
     normal = np.stack([steps[:, 1], -steps[:, 0]], axis=1)  # to the left, as y points down
     offsets = _offsets(loops, regions)
     points = loops.vertices + 0.5 * steps + offsets[:, None] * normal
+    is_band = np.array([coloring.is_band for coloring in regions.colorings])[regions.paint]
+    mine = np.repeat(loops.region, np.diff(loops.first))
+    soft = (loops.others != NO_REGION) & (mine != NO_REGION) & is_band[mine] & is_band[loops.others]
+    if soft.any():
+        smooth = _around(loops, loops.vertices + 0.5 * steps, SOFT) / (2 * SOFT)
+        points = np.where(soft[:, None], smooth, points)
     x, y = np.abs(trends).T
     is_level = (loops.directions == RIGHT) | (loops.directions == LEFT)
     return Boundary(points, np.where(is_level, x >= y, y > x), offsets, trends)
@@ -86,13 +93,19 @@ def _intrusion(regions: Regions, start: Ints, step: Ints, mine: Floats, theirs: 
 
 def _trends(loops: Loops) -> Floats:
     """Return the direction of the outline at each crack, from those near it; shape (crack, 2)."""
-    steps = STEPS[loops.directions].astype(np.float64)
+    return _around(loops, STEPS[loops.directions].astype(np.float64), TREND)
+
+
+def _around(loops: Loops, values: Floats, reach: int) -> Floats:
+    """Return the sums of ``values`` at the cracks, over those up to ``reach`` ahead and behind.
+
+    The outermost count half: on a diagonal, horizontal and vertical ones are then as many.
+    """
     sizes = np.diff(loops.first)
     size, base = np.repeat(sizes, sizes), np.repeat(loops.first[:-1], sizes)
-    position = np.arange(len(steps)) - base
-    total = steps.copy()
-    for away in range(1, TREND + 1):
-        # The outermost count half: on a diagonal, horizontal and vertical ones are then as many.
-        share = 0.5 if away == TREND else 1.0
-        total += share * (steps[base + (position + away) % size] + steps[base + (position - away) % size])
+    position = np.arange(len(values)) - base
+    total = values.copy()
+    for away in range(1, reach + 1):
+        share = 0.5 if away == reach else 1.0
+        total += share * (values[base + (position + away) % size] + values[base + (position - away) % size])
     return np.asarray(total)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.trace.assign import fill_gaps, without_orphans, without_specks
+from warpsplat.drawing.trace.bands import split_uneven
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
 from warpsplat.drawing.trace.palette import Coloring, paint_parts
@@ -55,7 +56,8 @@ def find_regions(image: Floats) -> Regions:
         image = _smoothed(image, noise)
     noise = min(noise, MOST_NOISE)
     seeds = _without_mixed_seeds(image, find_seeds(image, min(noise, MOST_SEED_NOISE)), noise)
-    parts = add_thin_parts(image, paint_parts(image, seeds, noise), noise)
+    parts = split_uneven(image, paint_parts(image, seeds, noise), noise)
+    parts = add_thin_parts(image, parts, noise)
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = fill_gaps(image, parts)
     painted, fills = without_orphans(image, painted, fills, sure=parts.labels != NO_REGION)

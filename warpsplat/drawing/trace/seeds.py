@@ -17,6 +17,9 @@ from warpsplat.drawing.trace.grids import (
 EDGE = 24  # [levels] step between neighbours that is an edge, whatever the noise
 NOISE_QUANTILE = 70  # [%] of the steps beside edges, that measures the noise
 
+BEND_OF_NOISE, ROUNDING = 1.7, 0.6
+"""How much steps of noise differ over their size, and what rounding to levels adds to that [levels]."""
+
 FLAT_STEP = 1.0  # [levels] largest step between neighbours of a flat region, besides noise
 RAMP_STEP = 12.0  # [levels] largest step between neighbours on a ramp, besides noise; more is an edge
 RAMP_BEND = 2.0  # [levels] largest change of that step from one pixel to the next, besides noise
@@ -30,12 +33,17 @@ def noise_of(image: Floats) -> float:
     0 for a drawing without noise.
     """
     grey = image.max(axis=2) if image.shape[2] == 1 else image[..., :3].mean(axis=2)
-    step = np.zeros(grey.shape, np.float32)
+    step, bend = np.zeros(grey.shape, np.float32), np.zeros(grey.shape, np.float32)
     step[:, 1:] = np.abs(np.diff(grey, axis=1))
     step[1:] = np.maximum(step[1:], np.abs(np.diff(grey, axis=0)))
+    bend[:, 1:-1] = np.abs(np.diff(grey, n=2, axis=1))
+    bend[1:-1] = np.maximum(bend[1:-1], np.abs(np.diff(grey, n=2, axis=0)))
     edge = step > EDGE
-    ring = step[dilated(edge, 13) & ~dilated(edge, 5)]
-    return float(np.percentile(ring if len(ring) >= 64 else step, NOISE_QUANTILE))
+    ring = dilated(edge, 13) & ~dilated(edge, 5)
+    beside = ring if ring.sum() >= 64 else np.ones_like(ring)
+    noise, bent = (float(np.percentile(change[beside], NOISE_QUANTILE)) for change in (step, bend))
+    # Steps that are all alike are a gradient; those of noise differ by more than they are.
+    return noise if bent > noise else max(bent / BEND_OF_NOISE - ROUNDING, 0.0)
 
 
 def find_seeds(image: Floats, noise: float) -> Ints:

@@ -58,7 +58,7 @@ class OutlineTracer:
         kinds = np.where(self.hiding[np.maximum(others, 0)] > rank, HIDDEN, SEEN)
         kinds = np.where(others == NO_REGION, EDGE, kinds)
         if (kinds == HIDDEN).all():
-            if self.loops.is_hole[loop] and not self.holed[others].any():
+            if self.loops.is_hole[loop] and not self._is_holed(loop):
                 return []
             if self.loops.is_hole[loop]:  # left open, a little smaller than what lies over it
                 between = 0.5 * (self.boundary.points[cracks] + self._middles(rank, cracks))
@@ -71,6 +71,10 @@ class OutlineTracer:
         bounds = [*np.flatnonzero(np.diff(kinds, prepend=-1)).tolist(), len(kinds)]
         stretches: list[Stretch] = [(int(kinds[a]), cracks[a:b]) for a, b in itertools.pairwise(bounds)]
         return self._chain(rank, stretches)
+
+    def _is_holed(self, loop: int) -> bool:
+        """Return whether anything transparent lies in the hole that a loop bounds."""
+        return bool(self.holed[self.loops.region[self.loops.network == self.loops.network[loop]]].any())
 
     def _ring(self, cracks: Ints) -> Polyline | Floats:
         """Return a loop that is seen all around."""
@@ -153,7 +157,8 @@ class OutlineTracer:
                 start, end = ends[number - 1][1], ends[(number + 1) % count][0]
                 goals = np.concatenate([start[None], self._middles(rank, cracks), end[None]])
                 vertices = self.loops.vertices[[*cracks, cracks[-1], cracks[-1]]].astype(np.float64)
-                holed = bool(self.holed[self.loops.others[cracks]].any())
+                # Something transparent may lie between regions as well as inside one.
+                holed = bool(self.holed.any())
                 parts.append(shortest_path(self.cover, rank, goals, vertices, through_holes=holed))
         return parts
 

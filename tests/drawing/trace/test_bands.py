@@ -1,0 +1,41 @@
+"""Smooth shading: which parts are cut into bands, and what the bands show."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from warpsplat.drawing.trace.seeds import noise_of
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.metrics import psnr
+from warpsplat.rendering.renderer import render
+
+
+def _shadow(side: int = 96) -> np.ndarray:
+    """A square with a soft shadow below, sRGB in [0, 1]."""
+    shade = np.zeros((side, side), np.float32)
+    shade[24:80, 20:76] = 0.5
+    tone = np.repeat(1 - cv2.GaussianBlur(shade, (0, 0), 4)[..., None], 3, axis=2)
+    tone[20:72, 20:76] = (0.2, 0.4, 0.9)
+    return np.round(tone * 255).astype(np.float32) / 255
+
+
+def test_a_soft_shadow_is_a_few_bands() -> None:
+    image = _shadow()
+    scene = trace(image).scene
+    assert 6 <= len(scene) <= 30
+    assert psnr(255 * render(scene), 255 * image) > 36  # a single gradient reaches 28
+
+
+def test_a_linear_gradient_stays_one_gradient() -> None:
+    ramp = np.linspace(0.2, 0.9, 64, dtype=np.float32)
+    image = np.round(np.broadcast_to(ramp[:, None], (64, 64, 3)) * 255).astype(np.float32) / 255
+    assert len(trace(image).scene) == 1
+
+
+def test_a_slope_is_no_noise_but_grain_is() -> None:
+    ramp = np.round(np.broadcast_to(np.linspace(0, 240, 80)[:, None], (80, 80, 3)))
+    image = np.concatenate([ramp, np.full((80, 80, 1), 255.0)], axis=2).astype(np.float32)
+    assert noise_of(image) < 0.5
+    image[..., :3] += np.random.default_rng(0).normal(0, 4, (80, 80, 1))
+    assert noise_of(image) > 3

@@ -1,0 +1,184 @@
+"""Smooth shading that no single gradient describes, as bands along its lines of equal tone."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
+from warpsplat.drawing.trace.ramps import fit_ramp
+from warpsplat.portable import filters
+from warpsplat.portable.linear import product
+
+LEAST_BAND = 30  # [px] of a band; smaller pieces stay with what surrounds them
+MOST_BANDS = 256  # of an image
+SOFT = 1.5  # [px] standard deviation of the blur before a part is cut, so that noise does not fray the bands
+POWERS = 8  # steps of the power iteration
+TONES = 64  # levels of tone among which a part is cut in two
+FLAT_BYTES, RAMP_BYTES = 100.0, 250.0  # of a band in a file, about, with a flat colour or a gradient
+FLOOR = 1.5  # [levels] root mean square of the error that edges leave in any file, about
+DOUBLING = 1 / 3
+"""Share of its error that a file may gain for a share of its bytes: about 1 dB for twice the bytes."""
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A connected part of an image, in its bounding box."""
+
+    left: int
+    top: int
+    mask: Bools
+    """Shape (height, width)."""
+    coloring: Coloring
+    error: float
+    """Sum of the squared errors over all pixels and channels [levels squared]."""
+
+    def box(self) -> tuple[slice, slice]:
+        """Return the rows and columns of the bounding box."""
+        height, width = self.mask.shape
+        return slice(self.top, self.top + height), slice(self.left, self.left + width)
+
+    def bytes(self) -> float:
+        """Return about the bytes in a file."""
+        return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
+
+
+def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
+    """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
+
+    Args:
+        image: premultiplied, 0..255, shape (height, width, 4).
+        parts: of the image.
+        noise: of flat regions [levels].
+    """
+    waiting = _uneven(image, parts, UNEVEN + noise)
+    if not waiting:
+        return parts
+    error = sum(piece.error for piece in waiting) + image.size * (FLOOR + noise) ** 2
+    size = FLAT_BYTES * len(parts.paint)
+    queue = [(-piece.error, number, piece) for number, piece in enumerate(waiting)]
+    heapq.heapify(queue)
+    done: list[_Piece] = []
+    made = len(queue)
+    while queue and made < MOST_BANDS:
+        _, _, piece = heapq.heappop(queue)
+        halves = _halves(image, piece)
+        gain = piece.error - sum(half.error for half in halves)
+        growth = sum(half.bytes() for half in halves) - piece.bytes()
+        if len(halves) < 2 or gain / error <= DOUBLING * growth / size:
+            done.append(piece)
+            continue
+        error, size = error - gain, size + growth
+        for half in halves:
+            made += 1
+            heapq.heappush(queue, (-half.error, made, half))
+    return _with_bands(image, parts, done + [piece for *_, piece in sorted(queue)])
+
+
+def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
+    """Return the parts that are off their colouring by more than ``least`` in the root mean square."""
+    found = []
+    sizes = np.bincount(parts.labels[parts.labels >= 0], minlength=len(parts.paint))
+    off = np.where((parts.labels >= 0)[..., None], image - parts.fills, 0)
+    flat = np.bincount(
+        np.maximum(parts.labels, 0).reshape(-1), (off**2).sum(axis=2).reshape(-1), len(parts.paint)
+    )
+    for part in np.flatnonzero(sizes >= 2 * LEAST_BAND).tolist():
+        coloring = parts.colorings[parts.paint[part]]
+        values = int(sizes[part]) * image.shape[2]
+        error = float(flat[part]) if coloring.ramp is None else values * coloring.ramp.residual**2
+        if error > values * least**2:
+            mask = parts.labels == part
+            left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+            mask = mask[top : top + height, left : left + width]
+            found.append(_Piece(left, top, mask, coloring, error))
+    return found
+
+
+def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
+    """Return the connected parts of the lighter and the darker half of a piece."""
+    own, mask = image[piece.box()], piece.mask
+    if mask.sum() < 2 * LEAST_BAND or not np.ptp(own[mask], axis=0).any():
+        return []
+    pixels = own[mask].astype(np.float64)
+    tone = ((own - pixels.mean(axis=0)) * _direction(pixels)).sum(axis=2)
+    weight = filters.gaussian_blur(mask, SOFT)
+    soft = filters.gaussian_blur((tone * mask).astype(np.float32), SOFT) / np.maximum(weight, 1e-3)
+    light = soft > _threshold(soft[mask])
+    for _ in range(2):  # what is too small goes to the other half, where it may join what is too small there
+        for half in (light, ~light):
+            numbers, count = _components(mask & half)
+            small = np.bincount(numbers.reshape(-1), minlength=count + 1) < LEAST_BAND
+            small[0] = False
+            light ^= small[numbers]
+    found = []
+    for half in (light, ~light):
+        numbers, count = _components(mask & half)
+        for number in range(1, count + 1):
+            found.append(_piece(image, piece, numbers == number))
+    return found
+
+
+def _direction(pixels: Floats) -> Floats:
+    """Return the unit vector along which colours, shape (pixel, channel), vary most."""
+    off = pixels - pixels.mean(axis=0)
+    matrix = product(off.T, off)
+    direction = matrix[:, matrix.diagonal().argmax()]
+    for _ in range(POWERS):
+        direction = direction / np.abs(direction).max()
+        direction = (matrix * direction).sum(axis=1)
+    return direction / np.sqrt((direction**2).sum())
+
+
+def _components(mask: Bools) -> tuple[Ints, int]:
+    """Return the number of the connected part of each pixel, 0 outside, and how many there are."""
+    count, numbers = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    return np.asarray(numbers, np.int32), count - 1
+
+
+def _threshold(tones: Floats) -> float:
+    """Return the tone that leaves the least variance on both of its sides (Otsu 1979)."""
+    low, high = float(tones.min()), float(tones.max())
+    counts, edges = np.histogram(tones, TONES, (low, max(high, low + 1e-3)))
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    below = np.cumsum(counts)[:-1].astype(np.float64)
+    sums = np.cumsum(counts * middles)
+    above = len(tones) - below
+    apart = sums[:-1] / np.maximum(below, 1) - (sums[-1] - sums[:-1]) / np.maximum(above, 1)
+    return float(edges[1:-1][(below * above * apart**2).argmax()])
+
+
+def _piece(image: Floats, whole: _Piece, mask: Bools) -> _Piece:
+    """Return a part of a piece with the better of a flat colour and a gradient."""
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    mask = mask[top : top + height, left : left + width]
+    left, top = left + whole.left, top + whole.top
+    box = image[top : top + height, left : left + width]
+    pixels = box[mask].astype(np.float64)
+    mean = pixels.mean(axis=0)
+    flat = float(((pixels - mean) ** 2).sum())
+    best = _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
+    ramp = fit_ramp(box, mask, left, top)
+    if ramp is not None:
+        error = pixels.size * ramp.residual**2
+        if error < flat * FLAT_BYTES / RAMP_BYTES:
+            return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
+    return best
+
+
+def _with_bands(image: Floats, parts: Parts, pieces: list[_Piece]) -> Parts:
+    """Return the parts with some of them replaced by ``pieces``."""
+    labels, fills = parts.labels.copy(), parts.fills.copy()
+    for number, piece in enumerate(pieces, len(parts.paint)):
+        labels[piece.box()][piece.mask] = number
+        color = image[piece.box()] if piece.coloring.ramp else piece.coloring.color
+        fills[piece.box()][piece.mask] = np.broadcast_to(color, (*piece.mask.shape, image.shape[2]))[
+            piece.mask
+        ]
+    first = len(parts.colorings)
+    paint = np.concatenate([parts.paint, np.arange(first, first + len(pieces), dtype=parts.paint.dtype)])
+    return Parts(labels, fills, paint, parts.colorings + [piece.coloring for piece in pieces])
