@@ -26,8 +26,8 @@ Colors = Literal["held", "fitted"]
 OUTLINE_STEPS = 200
 """Most steps of a refinement."""
 
-OUTLINE_RATE = 0.25
-"""Learning rate of points at the start [px]: outlines are traced to about a pixel."""
+OUTLINE_RATE = 0.08
+"""Learning rate of points at the start [px]: larger ones entangle the outlines of small letters."""
 
 FINAL_RATE = 0.02
 """Learning rates at the end over those at the start: what is left to gain is hundredths of a pixel."""

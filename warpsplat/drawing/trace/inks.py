@@ -17,12 +17,11 @@ DARKEST = 3  # pixels whose median is the ink
 
 
 def with_inks(regions: Regions) -> Regions:
-    """Return the regions with one ink for all thin parts that show more or less of it."""
+    """Return clean regions with one ink for all thin parts that show more or less of it."""
     painted = regions.paint[regions.labels]
     flat = [k for k in np.unique(painted).tolist() if regions.colorings[k].ramp is None]
-    limit = MIXED + regions.noise
     colors = {k: regions.colorings[k].color for k in flat}
-    solid = [k for k in flat if _is_solid(regions.image, painted == k, colors[k], limit)]
+    solid = [k for k in flat if _is_solid(regions.image, painted == k, colors[k])]
     if not solid or len(solid) == len(flat):
         return regions
     bases = {}
@@ -37,7 +36,7 @@ def with_inks(regions: Regions) -> Regions:
     for k in sorted(bases, key=lambda k: (-float(((colors[k] - bases[k]) ** 2).sum()), k)):
         offs = {j: _off(colors[k] - bases[k], colors[j] - bases[k]) for j in inks}
         ink = min(offs, key=offs.__getitem__)
-        if offs[ink] <= limit:
+        if offs[ink] <= MIXED:
             paint[regions.paint == k] = ink
         else:
             inks.append(k)
@@ -45,9 +44,9 @@ def with_inks(regions: Regions) -> Regions:
     return replace(regions, paint=paint, colorings=colorings)
 
 
-def _is_solid(image: Floats, own: Bools, color: Floats, limit: float) -> bool:
+def _is_solid(image: Floats, own: Bools, color: Floats) -> bool:
     """Return whether a colour covers an area, or a line as long as no letter's."""
-    exact = own & (np.abs(image - color).max(axis=2) <= limit)
+    exact = own & (np.abs(image - color).max(axis=2) <= MIXED)
     if eroded(exact, 3).any():
         return True
     _, _, stats, _ = cv2.connectedComponentsWithStats(exact.astype(np.uint8), connectivity=8)

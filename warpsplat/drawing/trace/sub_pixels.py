@@ -13,16 +13,16 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints, components, dilated
 from warpsplat.drawing.trace.inks import with_inks
-from warpsplat.drawing.trace.mixtures import DISTANCE_COST
+from warpsplat.drawing.trace.mixtures import DISTANCE_COST, MIXED
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.portable import elementary, filters
 
 SCALES = (4, 3, 2)
 MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
-THIN_SHARE = 0.2  # of the mixed pixels, from which on an image is drawn by sub-pixels
+FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
+THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
-PURE = 0.04  # share up to which a colour is no part of a pixel, without noise
-PURE_NOISE = 1 / 128  # what a level of noise adds to that
+PURE = 0.04  # share up to which a colour is no part of a pixel
 SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
 WEIGHT = 256  # that stands for 1 where weights are whole numbers
 SWEEPS = 4  # in which sub-pixels change places
@@ -45,14 +45,15 @@ def with_sub_pixels(regions: Regions) -> Regions:
     """Return the regions at several times the resolution if many of them are thin."""
     height, width = regions.labels.shape
     scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
-    if scale == 1 or any(regions.colorings[k].ramp is not None for k in np.unique(regions.paint).tolist()):
+    is_flat = all(regions.colorings[k].ramp is None for k in np.unique(regions.paint).tolist())
+    if scale == 1 or regions.noise or not is_flat:
         return regions
     inked = with_inks(regions)
+    colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
     painted, mixed = _unmixed(inked)
-    if _thin_share(painted, mixed) < THIN_SHARE:
+    if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
         return regions
     small = _mapped(painted, mixed, scale)
-    colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
     fills = colors[small]
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
@@ -79,11 +80,17 @@ def _unmixed(regions: Regions) -> tuple[Ints, _Mixed]:
             better = off < cost[rows, columns]
             at = rows[better], columns[better]
             cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
-    least = PURE + PURE_NOISE * regions.noise
-    share = np.where(share < least, 0, np.where(share > 1 - least, 1, share))
-    rows, columns = np.nonzero((share > 0) & (share < 1))
+    rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE))
     at = rows, columns
     return np.where(share >= 0.5, first, second), _Mixed(rows, columns, first[at], second[at], share[at])
+
+
+def _foreign_share(regions: Regions, mixed: _Mixed, colors: Floats) -> float:
+    """Return the share of the mixed pixels that are not mixed of two colours."""
+    share = mixed.share[:, None]
+    expected = share * colors[mixed.first] + (1 - share) * colors[mixed.second]
+    off = np.abs(regions.image[mixed.rows, mixed.columns] - expected).max(axis=1)
+    return float((off > MIXED).mean()) if len(off) else 0.0
 
 
 def _thin_share(painted: Ints, mixed: _Mixed) -> float:
