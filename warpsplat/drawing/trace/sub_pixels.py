@@ -20,6 +20,7 @@ from warpsplat.portable import elementary, filters
 SCALES = (4, 3, 2)
 MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
 FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
+MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
@@ -45,12 +46,13 @@ def with_sub_pixels(regions: Regions) -> Regions:
     """Return the regions at several times the resolution if many of them are thin."""
     height, width = regions.labels.shape
     scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
-    is_flat = all(regions.colorings[k].ramp is None for k in np.unique(regions.paint).tolist())
-    if scale == 1 or regions.noise or not is_flat:
+    used = np.unique(regions.paint).tolist()
+    is_flat = all(regions.colorings[k].ramp is None for k in used)
+    if scale == 1 or regions.noise or not is_flat or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
     colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
-    painted, mixed = _unmixed(inked)
+    painted, mixed = _unmixed(inked, colors)
     if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
         return regions
     small = _mapped(painted, mixed, scale)
@@ -62,8 +64,8 @@ def with_sub_pixels(regions: Regions) -> Regions:
     return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
 
 
-def _unmixed(regions: Regions) -> tuple[Ints, _Mixed]:
-    """Return the colouring with the larger share in each pixel, and the pixels that are mixed."""
+def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
+    """Return the colouring with the larger share in each pixel, and the mixed pixels; ``colors``: of all."""
     painted = regions.paint[regions.labels]
     numbers = np.unique(painted).tolist()
     distances = {k: filters.distance(painted != k) for k in numbers}
@@ -72,17 +74,18 @@ def _unmixed(regions: Regions) -> tuple[Ints, _Mixed]:
     for i, a in enumerate(numbers):
         for b in numbers[i + 1 :]:
             rows, columns = np.nonzero((distances[a] < NEAR) & (distances[b] < NEAR))
-            one, other = (regions.colorings[k].color.astype(np.float32) for k in (a, b))
-            between, away = one - other, regions.image[rows, columns] - other
+            between, away = colors[a] - colors[b], regions.image[rows, columns] - colors[b]
             t = np.clip((away * between).sum(axis=1) / max(float((between**2).sum()), 1e-6), 0, 1)
             off = np.abs(away - t[:, None] * between).max(axis=1, initial=0)
             off += DISTANCE_COST * (distances[a] + distances[b])[rows, columns]
             better = off < cost[rows, columns]
             at = rows[better], columns[better]
             cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
-    rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE))
+    most = np.where(share >= 0.5, first, second)
+    is_pure = np.abs(regions.image - colors[most]).max(axis=2) <= MIXED
+    rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE) & ~is_pure)
     at = rows, columns
-    return np.where(share >= 0.5, first, second), _Mixed(rows, columns, first[at], second[at], share[at])
+    return most, _Mixed(rows, columns, first[at], second[at], share[at])
 
 
 def _foreign_share(regions: Regions, mixed: _Mixed, colors: Floats) -> float:
