@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -238,16 +239,25 @@ def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: f
 
 def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     """Return a drawing with basic shapes in place of contours."""
+    contours = {}
+    for one in chosen:
+        cubics = one.made.cubics()
+        joints = joints_of(Pieces(cubics, _is_line(cubics)))
+        contours[one.contour] = cubics[:, :3].reshape(-1, 2), joints
+    return with_contours(drawing, contours)
+
+
+def with_contours(
+    drawing: Drawing, contours: Mapping[int, tuple[npt.NDArray[Any], npt.NDArray[Any]]]
+) -> Drawing:
+    """Return a drawing with other points and joints of some contours."""
     scene = drawing.scene
     starts = scene.starts.tolist()
     points = [scene.points[a:b] for a, b in pairwise(starts)]
     joints = [drawing.joints[a:b] for a, b in pairwise(starts)]
-    for one in chosen:
-        cubics = one.made.cubics()
-        points[one.contour] = cubics[:, :3].reshape(-1, 2).astype(np.float32)
-        joints[one.contour] = joints_of(Pieces(cubics, _is_line(cubics))).astype(np.int32)
-    counts = np.array([len(own) for own in points], np.int32)
-    after = starts_of(counts)
+    for contour, (own_points, own_joints) in contours.items():
+        points[contour], joints[contour] = own_points.astype(np.float32), own_joints.astype(np.int32)
+    after = starts_of(np.array([len(own) for own in points], np.int32))
     first = after[np.searchsorted(scene.starts, scene.first)]
     changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
     return Drawing(changed, np.concatenate(joints), np.full(len(changed.points), NONE, np.int32))

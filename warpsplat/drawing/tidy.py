@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.drawing.cells import by_cell, first_apart, sum_within
+from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
 from warpsplat.drawing.nodes import MOST_DISTANCE, Edit, Key, Outlines, applied, turned
 from warpsplat.drawing.shapes import with_shapes
@@ -81,6 +82,7 @@ def finish_drawing(
     finest: float = GRIDS[-1],
     tidy: bool = True,
     price: float = 1.0,
+    symbols: bool = False,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -92,6 +94,7 @@ def finish_drawing(
         finest: most view box units per pixel.
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
+        symbols: whether nearly equal outlines become equal.
     """
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
@@ -101,20 +104,37 @@ def finish_drawing(
     if tidy:
         drawing = tidied(target, drawing, run.part(FIRST_END, ROUNDS_END), price)
     drawing = refine_drawing(target, drawing, run.part(ROUNDS_END, SECOND_END), second)
+    equal: list[Equal] = []
     if tidy:
-        judge = Judge(target, run.backend)
-        errors = judge.errors(drawing)
-        worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
-        drawing = with_shapes(target, drawing, judge.errors, errors, worth)
+        drawing, equal = _regular(target, drawing, run, price, symbols=symbols)
     grid = drawing_grid(target, drawing, run.backend, finest, price)
     on, _ = drawing.links()
-    low = rounded(drawing.scene, grid)
-    held = held_rounds(low, grid)
+    low, held = on_grid(rounded(drawing.scene, grid), equal, grid)
+    held |= held_rounds(low, grid)
     held[on] = True
     points = np.where(held[:, None], low.points, drawing.scene.points)
     drawing = replace(drawing, scene=replace(drawing.scene, points=points))
     drawing = refine_drawing(target, drawing, run.part(SECOND_END, 1.0), REFIT, held=held)
-    return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+    low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
+    return Finished(replace(drawing, scene=low), grid)
+
+
+def _regular(
+    target: FloatArray, drawing: Drawing, run: Run, price: float, *, symbols: bool
+) -> tuple[Drawing, list[Equal]]:
+    """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
+    judge = Judge(target, run.backend)
+    errors = judge.errors(drawing)
+    worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
+    drawing = with_shapes(target, drawing, judge.errors, errors, worth)
+    if not symbols:
+        return drawing, []
+    quiet = replace(run, on_progress=None)
+
+    def refit(changed: Drawing) -> Drawing:
+        return refine_drawing(target, changed, quiet, REFIT)
+
+    return with_equal_outlines(drawing, judge.errors, judge.errors(drawing), worth, refit)
 
 
 def tidied(target: FloatArray, drawing: Drawing, run: Run, price: float = 1.0) -> Drawing:

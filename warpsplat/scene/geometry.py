@@ -13,6 +13,9 @@ from warpsplat.scene.scene import FloatArray, Scene
 PIECES = 8
 """Straight pieces of a Bézier from which areas and boxes are computed."""
 
+HANDLE = 4 * (np.sqrt(2) - 1) / 3
+"""Length of the handles of the cubic for a quarter of the unit circle."""
+
 
 def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:
     """Return contours of equal length as cubics: (contour, point, 2) -> (contour, Bézier, 4, 2)."""

@@ -12,13 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.scene.geometry import HANDLE
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
 
 Floats = npt.NDArray[np.float64]
-
-HANDLE = 4 * (np.sqrt(2) - 1) / 3
-"""Length of the handles of a quarter of the unit circle."""
 
 NEAR = 0.01
 """Largest distance of an exact outline's points from their places, in units of the view box: single precision

@@ -7,7 +7,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, lstsq, product, solve
-from warpsplat.svg.primitives import HANDLE
+from warpsplat.scene.geometry import HANDLE
 
 
 def fit_ellipse(points: Floats, tolerance: float) -> Floats | None:
