@@ -23,7 +23,7 @@ from warpsplat.scene.geometry import enlarged
 LEAST_ORIGINAL_SIDE = 96
 """Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
 
-DRAFT_GRID = 5.0
+DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
 
 

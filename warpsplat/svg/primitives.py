@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, Kind, Scene
-from warpsplat.scene.geometry import HANDLE
+from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
 
@@ -67,7 +67,7 @@ class Primitive:
         for i, corner in enumerate(corners):
             a, b, c = places[2 * i : 2 * i + 3]
             if rx > 0:
-                found.append([a, a + HANDLE * (corner - a), b + HANDLE * (corner - b), b])
+                found.append([a, a + ARC_HANDLE * (corner - a), b + ARC_HANDLE * (corner - b), b])
             if not self.is_round[i % 2]:
                 found.append([b, (2 * b + c) / 3, (b + 2 * c) / 3, c])
         cubics = np.array(found)

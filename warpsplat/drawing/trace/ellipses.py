@@ -7,7 +7,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, lstsq, product, solve
-from warpsplat.scene.geometry import HANDLE
+from warpsplat.scene.geometry import ARC_HANDLE
 
 
 def fit_ellipse(points: Floats, tolerance: float) -> Floats | None:
@@ -48,7 +48,7 @@ def fit_ellipse(points: Floats, tolerance: float) -> Floats | None:
     following = np.roll(points, -1, axis=0)
     if (points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]).sum() < 0:
         frame[:, 1] *= -1
-    quarter = np.array([(1, 0), (1, HANDLE), (HANDLE, 1), (0, 1)])
+    quarter = np.array([(1, 0), (1, ARC_HANDLE), (ARC_HANDLE, 1), (0, 1)])
     turn = np.array([(0, -1), (1, 0)])
     cubics = []
     for _ in range(4):
