@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
-from warpsplat.drawing.shapes import CUBIC_BYTES, Errors, with_contours
+from warpsplat.drawing.shapes import CUBIC_BYTES, Errors, cubics_of, with_contours
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.fit.constraints import Drawing
 from warpsplat.portable.elementary import hypot
@@ -102,11 +102,8 @@ def _moments(scene: Scene, part: IndexArray) -> tuple[Floats, Floats]:
     """Return the centre of an outline, and numbers that describe its form [px]."""
     places, weights, boxes = [], [], []
     for contour in part.tolist():
-        ring = scene.points[scene.starts[contour] : scene.starts[contour + 1]].astype(np.float64)
-        ring = np.concatenate([ring, ring[:1]])
-        cubics = ring[np.arange(0, len(ring) - 1, 3)[:, None] + np.arange(4)]
         t = (np.arange(SAMPLES_PER_CUBIC) + 0.5) / SAMPLES_PER_CUBIC
-        points = points_at(cubics, t).reshape(-1, 2)
+        points = points_at(cubics_of(scene, contour), t).reshape(-1, 2)
         along = (np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)) / 2
         places.append(points)
         weights.append(hypot(along[:, 0], along[:, 1]))
@@ -124,12 +121,7 @@ def _moments(scene: Scene, part: IndexArray) -> tuple[Floats, Floats]:
 
 def _cells(scene: Scene, part: IndexArray) -> Cells:
     """Return the cells around an outline."""
-    found = []
-    for contour in part.tolist():
-        ring = scene.points[scene.starts[contour] : scene.starts[contour + 1]].astype(np.float64)
-        ring = np.concatenate([ring, ring[:1]])
-        found += cells_around(ring[np.arange(0, len(ring) - 1, 3)[:, None] + np.arange(4)])
-    return joined(found)
+    return joined([own for contour in part.tolist() for own in cells_around(cubics_of(scene, contour))])
 
 
 def _with_nodes_of_one(drawing: Drawing, groups: list[list[IndexArray]]) -> Drawing:
