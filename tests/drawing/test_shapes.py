@@ -18,9 +18,9 @@ from tests.drawing.drawings import (
     rounded,
     star,
 )
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.shapes import merge_near
 from warpsplat.drawing.tidy import finish_drawing
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

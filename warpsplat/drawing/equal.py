@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.shapes import CUBIC_BYTES, Errors, cubics_of, with_contours
 from warpsplat.drawing.trace.beziers import points_at
-from warpsplat.fit.constraints import Drawing
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.primitives import primitives

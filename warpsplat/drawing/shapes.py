@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
+from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, summed
 from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
 from warpsplat.drawing.trace.curves import Pieces
-from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
-from warpsplat.kernels.constants import NONE
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import starts_of
@@ -229,13 +228,11 @@ def _areas(points: Floats) -> Floats:
 
 def _sizes(drawing: Drawing) -> Floats:
     """Return about the bytes of each contour."""
-    scene = drawing.scene
-    on, following = drawing.links()
-    chord = np.abs(scene.points[following] - scene.points[on])
-    is_level = chord.min(axis=1) < SAME_COORDINATE
+    cubics, starts = drawing.cubics(), drawing.scene.starts
+    is_level = np.abs(cubics[:, 3] - cubics[:, 0]).min(axis=1) < SAME_COORDINATE
     size = np.where(drawing.lines(), np.where(is_level, LEVEL_BYTES, LINE_BYTES), CUBIC_BYTES)
-    owner = np.searchsorted(scene.starts, on, "right") - 1
-    return np.asarray(MOVE_BYTES + np.bincount(owner, size, len(scene.closed)), np.float64)
+    owner = np.repeat(np.arange(len(starts) - 1), np.diff(starts) // 3)
+    return MOVE_BYTES + summed(owner, size, len(starts) - 1)
 
 
 def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: float) -> Floats:
@@ -272,7 +269,7 @@ def with_contours(
     after = starts_of(np.array([len(own) for own in points], np.int32))
     first = after[np.searchsorted(scene.starts, scene.first)]
     changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
-    return Drawing(changed, np.concatenate(joints), np.full(len(changed.points), NONE, np.int32))
+    return Drawing(changed, np.concatenate(joints))
 
 
 def _is_line(cubics: Floats) -> npt.NDArray[np.bool_]:

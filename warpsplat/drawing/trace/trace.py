@@ -20,12 +20,13 @@ from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import OutlineTracer
+from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
 OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
-MOST_REGIONS = 3000  # of any image; one with more is no drawing
+LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
+FEW_REGIONS = 3000  # which any image may have
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,6 @@ class Traced:
     scene: Scene
     joints: npt.NDArray[np.int32]
     """``Joint`` of each control point, shape (point,)."""
-    same: npt.NDArray[np.int32]
-    """-1 for each point: none is shared by several shapes. Shape (point,)."""
 
 
 def trace(image: FloatArray, *, most: int | None = None) -> Traced:
@@ -50,7 +49,8 @@ def trace(image: FloatArray, *, most: int | None = None) -> Traced:
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
-    regions = fewer_regions(find_regions(levels), MOST_REGIONS)
+    height, width = levels.shape[:2]
+    regions = fewer_regions(find_regions(levels), max(FEW_REGIONS, height * width // LEAST_AREA))
     traced = trace_regions(regions, may_have_ground=is_opaque)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
@@ -77,9 +77,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
     cover = Cover(hiding[regions.labels])
-    tracer = OutlineTracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
-    painted = np.flatnonzero((loops.region >= 0) & (ranks[loops.region] >= 0)).tolist()
-    outlines = [(int(loops.region[loop]), tracer.outline(loop)) for loop in painted]
+    outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
     contours: dict[int, list[Pieces]] = {}
@@ -146,7 +144,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
         opacities=np.where(has_ramp | (colors[:, 3] >= OPAQUE), 1, colors[:, 3] / 255).astype(np.float32),
         **_paints(shapes),
     )
-    return Traced(scene, joints.astype(np.int32), np.full(len(joints), -1, np.int32))
+    return Traced(scene, joints.astype(np.int32))
 
 
 def _paints(shapes: list[Fill]) -> dict[str, Any]:
