@@ -113,6 +113,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
     After a signal the exit code is always the signal's, so that a shell's loop stops.
     """
+    # NumPy's linear algebra, which is not used, would start threads.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # The objects of all imports are checked for cycles again and again: a quarter of the time that they take.
     gc.set_threshold(GARBAGE)
     code: Any = ExitCode.INTERNAL

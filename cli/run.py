@@ -22,7 +22,7 @@ from warpsplat.extensions import load_renderer
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.progress import Progress, TimeLeft
 from warpsplat.fit.settings import Settings
-from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.run.arguments import ALWAYS_THERE
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 
@@ -93,10 +93,14 @@ def watched(
     Raises:
         UsageError: an unknown device is found before a bar is shown.
     """
-    start_warp()
-    device = choose_device(request.device)
-    if shapes and request.verbose:
-        echo(f"{source}: {shapes} on {device}", err=True)
+    told = shapes and request.verbose
+    if told or request.device not in ALWAYS_THERE:
+        from warpsplat.rendering.device import choose_device, start_warp
+
+        start_warp()
+        device = choose_device(request.device)
+        if told:
+            echo(f"{source}: {shapes} on {device}", err=True)
     interrupt = Interrupt()
     bar = progress_bar(source, quiet=request.quiet, verbose=request.verbose)
     with interrupt.watching(), bar as on_progress:

@@ -9,9 +9,12 @@ pixels are in ``paint_columns``. On a transparent canvas the fourth plane is the
 is treated as a colour channel in which all shapes are 1 and the background is 0.
 
 The factories here, in ``composite_backward`` and in ``composite_opaque`` capture booleans; Warp drops the
-branches not taken. Scenes of flat paints on an opaque background have kernels of their own because the tests
-for other paints, made for each slot, cost a tenth of the time.
+branches not taken. Those of the first two make kernels when they are needed, which takes milliseconds each.
+Scenes of flat paints on an opaque background have kernels of their own because the tests for other paints,
+made for each slot, cost a tenth of the time.
 """
+
+import functools
 
 import warp as wp
 
@@ -25,11 +28,11 @@ STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
 
 
-def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kernel:
+@functools.cache
+def make_forward(*, painted: bool, straight: bool = False) -> wp.Kernel:
     """Return a kernel that composites each tile's list.
 
     Args:
-        name: of the kernel.
         painted: whether there may be gradients and pictures, or a transparent canvas.
         straight: whether the colours are to be straight, not premultiplied, as in DiffVG: the mean over the
             pixel's area of the colours, black where nothing is. That is colour / opacity x hit; hit, the part
@@ -37,6 +40,7 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
             underestimates where shapes meet.
     """
     skips_cached = not straight
+    name = "straight_forward" if straight else "paint_forward" if painted else "composite_forward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def forward(
@@ -118,11 +122,6 @@ def make_forward(name: str, *, painted: bool, straight: bool = False) -> wp.Kern
                     image[tile, 3, x] = column(1.0) - transmittance
 
     return forward
-
-
-composite_forward = make_forward("composite_forward", painted=False)
-paint_forward = make_forward("paint_forward", painted=True)
-straight_forward = make_forward("straight_forward", painted=True, straight=True)
 
 
 @wp.kernel

@@ -5,6 +5,8 @@ knows the share of all that lies behind, without stored lists:
 dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 """
 
+import functools
+
 import warp as wp
 
 from warpsplat.kernels import constants
@@ -27,13 +29,13 @@ def slope_of(mapping: wp.int32, signed: column) -> column:
     return slope
 
 
-def make_backward(name: str, *, painted: bool) -> wp.Kernel:
+@functools.cache
+def make_backward(*, painted: bool) -> wp.Kernel:
     """Return the adjoint for opacities below 1.
 
-    Args:
-        name: of the kernel.
-        painted: whether there may be gradients and pictures, or a transparent canvas.
+    ``painted``: whether there may be gradients and pictures, or a transparent canvas.
     """
+    name = "paint_backward" if painted else "composite_backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
@@ -145,7 +147,3 @@ def make_backward(name: str, *, painted: bool) -> wp.Kernel:
                     slot_columns[slot, 3] = opacity_grad
 
     return backward
-
-
-composite_backward = make_backward("composite_backward", painted=False)
-paint_backward = make_backward("paint_backward", painted=True)

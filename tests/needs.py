@@ -15,6 +15,7 @@ from warpsplat.extensions import extensions
 
 WORDS = {
     "batch": {"batch", "several images"},
+    "inkscape": {"inkscape"},
     "motion": {"animate", "preview"},
     "pages": {"serve", "report"},
     "paper": {"splat", "gaussian"},

@@ -215,9 +215,7 @@ def score_svg(
     """
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
-    paper = 255
-    if target.shape[2] == 4:
-        paper = max((0, 255), key=lambda level: _error(shown, target, level))
+    paper = max(_papers(target), key=lambda level: _error(shown, target, level))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check_stop(stop)
     perceptual = perceptual and height * width <= SSIMULACRA2_PIXELS
@@ -232,6 +230,17 @@ def score_svg(
         nodes=facts.nodes,
         **_sizes(text),
     )
+
+
+def psnr_of_file(text: str, target: Rows) -> float:
+    """Return the PSNR of ``score_svg`` for a file that this program wrote just now."""
+    shown = draw(text, target.shape[1], target.shape[0], own=True)
+    return decibels(max(_error(shown, target, paper) for paper in _papers(target)))
+
+
+def _papers(target: Rows) -> tuple[int, ...]:
+    """Return the levels of grey that a picture is compared on: black and white if ``target`` has opacity."""
+    return (0, 255) if target.shape[2] == 4 else (255,)
 
 
 def _sizes(text: str) -> dict[str, int]:

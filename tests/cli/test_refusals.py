@@ -24,7 +24,7 @@ VALID = {
     "eval": "eval photo.png drawing.svg",
     "batch": "batch good.yaml",
     "compare": "compare photo.png --against vtracer",
-    **{name: name for name in ("bench", "info", "doctor", "serve")},
+    **{name: name for name in ("bench", "info", "inkscape", "doctor", "serve")},
 }
 WITH_DEVICE = ("vectorize", "refine", "batch", "bench", "serve")
 OPTIMISING = ("vectorize photo.png", "refine drawing.svg photo.png")

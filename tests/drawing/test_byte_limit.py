@@ -12,7 +12,7 @@ from tests.runs import scored, vectorize
 from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.constraints import Drawing
-from warpsplat.fit.loop import Fit
+from warpsplat.fit.problem import Fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import choose_subject

@@ -12,7 +12,7 @@ import warpsplat
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
 from tests.runs import scored, vectorize
-from warpsplat.drawing.draw import LEAST_ORIGINAL_SIDE, enlargement
+from warpsplat.drawing.draft import LEAST_ORIGINAL_SIDE, enlargement
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg

@@ -10,6 +10,7 @@ from types import ModuleType
 import warp as wp
 
 import warpsplat
+from warpsplat.kernels import composite, composite_backward
 
 
 def kernels_of(module: ModuleType) -> list[wp.Kernel]:
@@ -37,4 +38,9 @@ def all_kernels() -> list[wp.Kernel]:
         )
     ]
     modules = map(importlib.import_module, sorted(names))
-    return list(dict.fromkeys(kernel for module in modules for kernel in kernels_of(module)))
+    made = [
+        composite.make_forward(painted=p, straight=s)
+        for p, s in ((False, False), (True, False), (True, True))
+    ]
+    made += [composite_backward.make_backward(painted=painted) for painted in (False, True)]
+    return list(dict.fromkeys([kernel for module in modules for kernel in kernels_of(module)] + made))

@@ -9,8 +9,8 @@ import pytest
 
 from tests.fit.pictures import picture
 from tests.scenes import disc, random_scene
-from warpsplat.fit.loop import Fit, fit
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

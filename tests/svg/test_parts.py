@@ -67,9 +67,9 @@ def test_small_shapes_and_twins_stay_whole() -> None:
 
 def test_files_have_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = squares([*GRID, *HOLES])
-    assert write_svg(scene, per_pixel=10).count("<path") == 3
+    assert write_svg(scene, per_pixel=10).count("evenodd") == 3
     monkeypatch.setattr(in_parts, "__defaults__", (40,))
     text = write_svg(scene, per_pixel=10, ids=True)
-    assert text.count("<path") == 5
-    names = re.findall(r'<path[^>]* id="([^"]*)"', text)
+    assert text.count("evenodd") == 5
+    names = re.findall(r'<(?:path|rect)[^>]* id="([^"]*)"', text)
     assert len(set(names)) == 5

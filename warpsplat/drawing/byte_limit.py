@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from warpsplat.fit.constraints import Drawing
-from warpsplat.fit.loop import Fit
+from warpsplat.fit.problem import Fit
+
+if TYPE_CHECKING:
+    from warpsplat.fit.constraints import Drawing
 
 
 @dataclass(frozen=True, eq=False)

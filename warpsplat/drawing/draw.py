@@ -1,32 +1,22 @@
-"""Drawings and pixel art: traced, and drawings then fitted and tidied."""
+"""Drawings, traced, fitted and tidied."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from warpsplat.drawing.byte_limit import Sketch, best_within
-from warpsplat.drawing.fit_outlines import matching
+from warpsplat.drawing.draft import as_fit, draw_pixels, enlargement, limited, original
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
-from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.export import finished
-from warpsplat.fit.loop import Fit
-from warpsplat.fit.palette import Palette, solid_shapes
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.palette import solid_shapes
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
-from warpsplat.fit.settings import Settings, solid_color
-from warpsplat.metrics import psnr
-from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
-
-LEAST_ORIGINAL_SIDE = 96
-"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
 
 
 def draw_regions(problem: Problem, run: Run) -> Fit:
@@ -53,14 +43,6 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
 
 
-def draw_pixels(problem: Problem, run: Run) -> Fit:
-    """Trace pixel art, a shape for each area of cells of one colour."""
-    scene, per_pixel = trace_pixels(problem.target, solid_color(problem.settings.background))
-    if problem.settings.is_limited:
-        scene = limited(scene.take(solid_shapes(scene)), problem.settings)
-    return replace(_made(scene, per_pixel, problem, run), interrupted=False)
-
-
 def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
     """Return the drawing or, for an image of few rows or columns, a better one if there is one."""
     across, down = margins(problem.target, THIN_SIDE)
@@ -78,7 +60,7 @@ def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     drawing, grid = trace_regions(wide, most), finest(settings)
     done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy)
     made = _sketch(wide, run, done).fit
-    return _made(cut(made.scene, across, down), made.per_pixel, problem, run)
+    return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
 
 
 def trace_regions(problem: Problem, most: int | None) -> Drawing:
@@ -95,43 +77,14 @@ def trace_regions(problem: Problem, most: int | None) -> Drawing:
     return drawing
 
 
-def enlargement(image: FloatArray) -> int:
-    """Return how many times an image was enlarged by repeating its pixels.
-
-    Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
-    """
-    size, side = cell_size(image), min(image.shape[:2])
-    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_ORIGINAL_SIDE)
-    return max(fits, default=1)
-
-
-def original(target: FloatArray) -> FloatArray:
-    """Return an image as it was before it was enlarged."""
-    size = enlargement(target)
-    return np.ascontiguousarray(target[::size, ::size])
-
-
-def limited(scene: Scene, settings: Settings) -> Scene:
-    """Return ``scene`` in the colours that the settings allow."""
-    palette = Palette.of_scene(settings, scene)
-    return palette.limited(scene) if palette else scene
-
-
 def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
     size = enlargement(problem.target)
     scene = enlarged(done.drawing.scene, size, *problem.size)
-    made = _made(scene, done.per_pixel / size, problem, run)
+    made = as_fit(scene, done.per_pixel / size, problem, run)
     return Sketch(made, _size(made, problem.settings), done.drawing)
 
 
 def _size(made: Fit, settings: Settings) -> int:
     """Return the bytes of the file."""
     return len(finished(made.scene, settings, made.per_pixel).encode())
-
-
-def _made(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
-    """Return a traced scene as a fit: its PSNR is that of its render."""
-    shown = 255 * render(scene, backend=run.backend)
-    figure = psnr(shown, 255 * matching(problem.target, scene.canvas))
-    return Fit(scene, per_pixel, figure, figure, 0, run.stopped())

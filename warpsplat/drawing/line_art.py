@@ -16,8 +16,8 @@ from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
 from warpsplat.fit.constraints import Drawing
-from warpsplat.fit.loop import Fit, Start, fit
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.scene import FloatArray, IndexArray, Scene

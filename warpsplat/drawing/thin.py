@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.fit.loop import Fit
+from warpsplat.fit.problem import Fit
 from warpsplat.scene import FloatArray, Scene
 
 THIN_SIDE = 16

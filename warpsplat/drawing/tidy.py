@@ -14,6 +14,7 @@ from warpsplat.alpha import squares
 from warpsplat.drawing.cells import by_cell, first_apart, sum_within
 from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
 from warpsplat.drawing.nodes import MOST_DISTANCE, Edit, Key, Outlines, applied, turned
+from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.constraints import Constraints, Drawing, Projection
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
@@ -23,6 +24,7 @@ from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
+from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 TIDY_ROUNDS, FEWEST_ROUNDS = 16, 4
@@ -99,11 +101,16 @@ def finish_drawing(
     if tidy:
         drawing = tidied(target, drawing, run.part(FIRST_END, ROUNDS_END), price)
     drawing = refine_drawing(target, drawing, run.part(ROUNDS_END, SECOND_END), second)
+    if tidy:
+        judge = Judge(target, run.backend)
+        errors = judge.errors(drawing)
+        worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
+        drawing = with_shapes(target, drawing, judge.errors, errors, worth)
     grid = drawing_grid(target, drawing, run.backend, finest, price)
     on, _ = drawing.links()
-    held = np.zeros(len(drawing.joints), np.bool_)
-    held[on] = True
     low = rounded(drawing.scene, grid)
+    held = held_rounds(low, grid)
+    held[on] = True
     points = np.where(held[:, None], low.points, drawing.scene.points)
     drawing = replace(drawing, scene=replace(drawing.scene, points=points))
     drawing = refine_drawing(target, drawing, run.part(SECOND_END, 1.0), REFIT, held=held)

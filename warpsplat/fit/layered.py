@@ -11,8 +11,8 @@ import functools
 import itertools
 from dataclasses import replace
 
-from warpsplat.fit.loop import Fit, Rounding, Start, fit
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.loop import Rounding, Start, fit
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import Scene

@@ -14,7 +14,7 @@ from warpsplat.fit.densification import densify, recover, remove_surplus
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
 from warpsplat.fit.place import grid_scene
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.rounding import (
@@ -40,24 +40,6 @@ from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
 from warpsplat.scene import Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
-
-
-@dataclass(frozen=True)
-class Fit:
-    """The result of a fit."""
-
-    scene: Scene
-    per_pixel: float
-    """View box units per pixel of the grid that the scene is rounded to, or can be."""
-    render_psnr: float
-    """PSNR of the last training render, at its size [dB]."""
-    estimated_psnr: float
-    """PSNR by the last step's loss [dB]: once the file is evaluated, an estimate of the file's."""
-    iterations: int
-    """Steps done."""
-    interrupted: bool
-    renewed: int = 0
-    """How often a shape was reset because of a number that was not finite."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ import warp as wp
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels import adam
-from warpsplat.kernels.paint import gradient_kernels
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
@@ -36,6 +35,8 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
     if parameters.has_twins:
         program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
     if parameters.has_circles:
+        from warpsplat.kernels.paint import gradient_kernels  # takes long to import
+
         program.launch(gradient_kernels.tie_circles, parameters.shape_count, parameters.arrays)
     units = units_of(settings, parameters.canvas)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,11 @@ from warpsplat.fit.export import export
 from warpsplat.fit.ramps import Bools, Ramps, RampSolver
 from warpsplat.fit.rounding import USUAL_GRID, byte_worth, finest
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.step import Step
 from warpsplat.scene import GRADIENTS, FloatArray, Paint, Scene, Spread
 from warpsplat.scene.scene import IntArray, starts_of
+
+if TYPE_CHECKING:
+    from warpsplat.fit.step import Step
 
 GRADIENT_BYTES = 185
 """Bytes of a gradient of two stops in a file, with the reference to it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,12 @@ from warpsplat.alpha import straight
 from warpsplat.fit.paints import without_gradients
 from warpsplat.fit.place import reduced
 from warpsplat.fit.settings import Settings, solid_color
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step
 from warpsplat.scene import Canvas, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas
+
+if TYPE_CHECKING:
+    from warpsplat.fit.state import FitState
+    from warpsplat.fit.step import Step
 
 KMEANS_ROUNDS = 20
 

@@ -1,18 +1,21 @@
-"""The two arguments of every fit: the problem to solve, and the run, which carries out the work."""
+"""Problems to fit, the runs that carry out the work, and their results: the arguments of every fit."""
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from warpsplat.fit.checkpoint import Checkpoint
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
-from warpsplat.rendering.backend import Backend
-from warpsplat.scene import FloatArray
+from warpsplat.scene import FloatArray, Scene
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,8 @@ class Run:
     which passes its progress reports on to the run that it was made from.
     """
 
-    backend: Backend
+    device: Backend | Callable[[], Backend]
+    """The device, or a function that starts it when it is first needed: a draft of a drawing needs none."""
     on_progress: Callback | None = None
     stop: Callable[[], bool] | None = None
     """Called after every step; once it returns True, the current shapes are the result."""
@@ -60,6 +64,11 @@ class Run:
     started: float = field(default_factory=time.monotonic)
     _ended: bool = field(default=False, init=False)
     """Whether ``on_progress`` asked for the end."""
+
+    @functools.cached_property
+    def backend(self) -> Backend:
+        """The device."""
+        return self.device() if callable(self.device) else self.device
 
     def stopped(self) -> bool:
         """Return whether the user wants the run to end."""
@@ -102,3 +111,21 @@ class Run:
     def unsized(self) -> Run:
         """Return a run that ends at the deadline, but whose number of steps does not depend on it."""
         return self.derived(deadline=math.inf, stop=self.over)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The result of a fit."""
+
+    scene: Scene
+    per_pixel: float
+    """View box units per pixel of the grid that the scene is rounded to, or can be."""
+    render_psnr: float
+    """PSNR of the last training render, at its size [dB]; NaN: a trace, which was not rendered."""
+    estimated_psnr: float
+    """PSNR by the last step's loss [dB]: once the file is evaluated, an estimate of the file's."""
+    iterations: int
+    """Steps done."""
+    interrupted: bool
+    renewed: int = 0
+    """How often a shape was reset because of a number that was not finite."""

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from warpsplat.fit.state import Past
 from warpsplat.scene import FloatArray, Scene
+
+if TYPE_CHECKING:
+    from warpsplat.fit.state import Past
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.fit.step import Step
 from warpsplat.kernels import constants
 from warpsplat.portable import elementary, linear
 from warpsplat.scene import GRADIENTS, FloatArray
 from warpsplat.scene.geometry import bounds
+
+if TYPE_CHECKING:
+    from warpsplat.fit.step import Step
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpsplat.fit.export import export, show
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.step import Step
 from warpsplat.portable import elementary
 from warpsplat.scene import OPACITY_RANGE, Paint, Scene
 from warpsplat.svg.viewer import on_white, premultiplied
 from warpsplat.svg.write import GRIDS, resized, rounded
+
+if TYPE_CHECKING:
+    from warpsplat.fit.step import Step
 
 STAGES, STAGE_SHARE = 3, 0.015
 """A third of the control points each (of cubics those on the outline, then the handles), and the steps after

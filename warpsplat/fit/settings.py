@@ -277,7 +277,7 @@ class Settings:
     fold_end: float = research(3.0, "The same at the end: folds are a fault in the file.", (1e-6, 1e6))
     through_scales: bool = research(True, "Whether gradients flow through the Gaussians' scales and angles.")
     viewer: bool = research(True, "Whether the last steps see what a viewer shows, rounded.")
-    tidy: bool = research(True, "Whether drawings lose nodes worth less than their bytes.")
+    tidy: bool = research(True, "Whether drawings are fitted, and lose nodes worth less than their bytes.")
     level_weight: float = research(0.3, "Weight of the error of each earlier level's picture.", WEIGHT)
     rates: dict[str, float] = research(
         default_rates, "Adam's rates at the start, by attribute.", WEIGHT, parse=parse_rates

@@ -57,7 +57,7 @@ def report(
             text, image = text_of(result, svg_name_of(result)), held(image)
             facts, own = Facts(score(text, image).as_dict(), command=command), False
         with backend_on(device, threads) as backend:
-            made = report_page(text, image, backend, facts, name=name, svg_name=svg_name, own=own)
+            made = report_page(text, image, backend(), facts, name=name, svg_name=svg_name, own=own)
     if output is not None:
         write_result(Path(output), made.encode())
     return made

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage import fill, stroke
+from warpsplat.kernels.coverage import fill
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
@@ -89,6 +89,8 @@ class ExactCoverage:
         slots, backend = self._inputs.slots, self._inputs.backend
         for part in self._parts:
             if part == constants.STROKE:
+                from warpsplat.kernels.coverage import stroke  # brings kernels that fills do not need
+
                 dim = slots, backend.lanes
                 self._launch(program, part, stroke.stroke_forward, dim, lane_rows=backend.lane_size)
             else:
@@ -108,6 +110,8 @@ class ExactCoverage:
         arrays = self._inputs.parameters.arrays
         for part in self._parts:
             if part == constants.STROKE:
+                from warpsplat.kernels.coverage import stroke
+
                 self._launch(program, part, stroke.stroke_backward, edges, sum_grad=gradient)
                 shapes, lines = self._inputs.parameters.shape_count, self._outline.buffers
                 program.launch(stroke.widths_backward, shapes, arrays, lines, self._inputs.viewport)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, composite_backward, composite_opaque, constants
+from warpsplat.kernels import composite, composite_backward, constants
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
@@ -68,15 +68,20 @@ class Film:
         """Composite the shapes of these stages from now on."""
         self._bins, self._coverage, self._paint = bins, coverage, paint
 
-    def _kernels(self) -> tuple[wp.Kernel, wp.Kernel]:
-        """Return the forward pass and its adjoint: those of flat paints on a background where that is all."""
+    def _painted(self) -> bool:
+        """Return whether there is more than flat paints on a background, which have kernels of their own."""
+        return self._straight or self.planes == 4 or not self._paint.is_flat
+
+    def _adjoint(self) -> wp.Kernel:
+        """Return the adjoint of compositing."""
+        painted = self._painted()
+        if not (self._straight or self._opaque):
+            return composite_backward.make_backward(painted=painted)
+        from warpsplat.kernels import composite_opaque  # which fits do not use
+
         if self._straight:
-            return composite.straight_forward, composite_opaque.straight_backward
-        if self.planes == 3 and self._paint.is_flat:
-            usual, opaque = composite_backward.composite_backward, composite_opaque.opaque_backward
-            return composite.composite_forward, opaque if self._opaque else usual
-        usual, opaque = composite_backward.paint_backward, composite_opaque.opaque_paint_backward
-        return composite.paint_forward, opaque if self._opaque else usual
+            return composite_opaque.straight_backward
+        return composite_opaque.opaque_paint_backward if painted else composite_opaque.opaque_backward
 
     def launch(self, program: Program, kernel: wp.Kernel, **values: Any) -> None:
         """Record a kernel that goes through each tile's list."""
@@ -87,7 +92,7 @@ class Film:
 
     def forward(self, program: Program) -> None:
         """Record lists and coverages -> ``image``."""
-        self.launch(program, self._kernels()[0])
+        self.launch(program, composite.make_forward(painted=self._painted(), straight=self._straight))
 
     def backward(self, program: Program) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
@@ -96,4 +101,4 @@ class Film:
         if self._opaque:
             slots = self._bins.buffers.list_slot.shape[0]
             values["transmittances"] = self._backend.array(column, slots, self._backend.lanes)
-        self.launch(program, self._kernels()[1], **values)
+        self.launch(program, self._adjoint(), **values)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import warp as wp
+from typing import TYPE_CHECKING
 
 from warpsplat.errors import ResourceError
 from warpsplat.native import machine_memory
-from warpsplat.rendering.backend import Viewport
+
+if TYPE_CHECKING:
+    import warp as wp
+
+    from warpsplat.rendering.backend import Viewport
 
 SHARE = 0.9
 """Share of a machine's memory that may be taken, as other programs need some."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import warp as wp
+if TYPE_CHECKING:  # settings name models, and are read where nothing is rendered
+    import warp as wp
 
-from warpsplat.rendering.bins import StageInputs
-from warpsplat.rendering.coverage import Coverage, ExactCoverage
-from warpsplat.rendering.outline import Outline
-from warpsplat.rendering.program import Program
+    from warpsplat.rendering.bins import StageInputs
+    from warpsplat.rendering.coverage import Coverage
+    from warpsplat.rendering.program import Program
 
 
 class Geometry(Protocol):
@@ -44,6 +44,9 @@ class ExactModel:
 
     def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """See ``Model``."""
+        from warpsplat.rendering.coverage import ExactCoverage
+        from warpsplat.rendering.outline import Outline
+
         outline = Outline(inputs, slack=self.slack)
         return outline, ExactCoverage(inputs, outline)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import warp as wp
 
@@ -11,7 +12,9 @@ from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.ranges import record_ranges
-from warpsplat.rendering.stroker import Stroker
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.stroker import Stroker
 
 
 @dataclass
@@ -52,8 +55,12 @@ class Outline:
         sizes = {"beziers": parameters.bezier_count, "shapes": parameters.shape_count}
         self.buffers = inputs.backend.allocate(OutlineBuffers, sizes | {"vertices": inputs.samples})
         self._sources = (self.buffers, parameters.arrays, inputs.viewport)
-        self.stroker = Stroker(inputs, self.buffers) if constants.STYLED in parameters.parts else None
+        self.stroker: Stroker | None = None
         """Stage of the strokes that are drawn as polygons."""
+        if constants.STYLED in parameters.parts:
+            from warpsplat.rendering.stroker import Stroker  # brings kernels that few scenes need
+
+            self.stroker = Stroker(inputs, self.buffers)
 
     def samples(self) -> dict[str, wp.array]:
         """Return the samples that tiles are found from, as ``bins.rectangles`` takes them."""

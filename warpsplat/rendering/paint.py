@@ -6,13 +6,14 @@ inlined there. Gradients and pictures fill arrays that compositing reads, and re
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.paint import flat, gradient_kernels, picture
-from warpsplat.kernels.paint.gradient import Gradients
+from warpsplat.kernels.paint import flat
 from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
@@ -60,17 +61,19 @@ class Painting:
                 "paint_slots": 1 if self.is_flat else slots,
             },
         )
-        self._gradients = Gradients()
-        for name in Gradients.vars:  # type: ignore[attr-defined]  # of Warp's struct
-            setattr(self._gradients, name, parameters.arrays[name])
+        self._gradients = _gradients_in(parameters.arrays) if self.has_gradients else {}
         self._sources = (self.buffers, inputs.bins.buffers, parameters.arrays, inputs.viewport)
 
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         kernels = []
         if self.has_gradients:
+            from warpsplat.kernels.paint import gradient_kernels  # takes long to import
+
             kernels += gradient_kernels.FORWARD
         if self._pictures:
+            from warpsplat.kernels.paint import picture
+
             kernels.append(picture.picture_forward)
         for kernel in kernels:
             program.launch(
@@ -78,7 +81,7 @@ class Painting:
                 (self._slots, self._backend.lanes),
                 *self._sources,
                 self._pictures or {},
-                {"g": self._gradients},
+                self._gradients,
                 lane_columns=self._backend.lane_size,
                 split=True,
             )
@@ -87,6 +90,18 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         shapes = self._shape_count
         if self.has_gradients:
+            from warpsplat.kernels.paint import gradient_kernels
+
             for kernel in gradient_kernels.BACKWARD:
-                program.launch(kernel, shapes, *self._sources, g=self._gradients, split=True)
+                program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
         program.launch(flat.flat_backward, shapes, *self._sources, lanes=self._backend.lanes, split=True)
+
+
+def _gradients_in(arrays: Mapping[str, wp.array]) -> dict[str, Any]:
+    """Return the paints of shapes as the kernels of gradients take them."""
+    from warpsplat.kernels.paint.gradient import Gradients
+
+    paints = Gradients()
+    for name in Gradients.vars:  # type: ignore[attr-defined]  # of Warp's struct
+        setattr(paints, name, arrays[name])
+    return {"g": paints}

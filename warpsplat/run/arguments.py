@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from inspect import Parameter
-from typing import Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.fit.options import nearest
 from warpsplat.fit.settings import Settings
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.device_lock import device_lock
 from warpsplat.run.options import settings_from
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
+
+ALWAYS_THERE = ("auto", "cpu")
+"""Names of devices that every machine has. Finding out takes as long as tracing a logo."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -57,11 +61,26 @@ def settings_given(function: Callable[..., Any], settings: Settings | None, **op
 
 
 @contextmanager
-def backend_on(device: str, threads: int | None) -> Iterator[Backend]:
-    """Hold the device, and return its backend; raise ``UsageError`` for an unknown one."""
+def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backend]]:
+    """Yield a function that starts the device, which is then held, and returns its backend.
+
+    Raises ``UsageError`` at once for an unknown device.
+    """
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
-    start_warp()
-    backend = Backend.on(choose_device(device), threads)
-    with device_lock(backend.device):
-        yield backend
+    with ExitStack() as held:
+
+        @functools.cache
+        def started() -> Backend:
+            from warpsplat.rendering.backend import Backend
+            from warpsplat.rendering.device import choose_device, start_warp
+            from warpsplat.rendering.device_lock import device_lock
+
+            start_warp()
+            backend = Backend.on(choose_device(device), threads)
+            held.enter_context(device_lock(backend.device))
+            return backend
+
+        if device not in ALWAYS_THERE:
+            started()
+        yield started

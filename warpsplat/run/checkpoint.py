@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from warpsplat.fit.checkpoint import SAVE_INTERVAL, Checkpoint, Content
 from warpsplat.fit.options import parse_duration
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings
-from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
 
 log = logging.getLogger(__name__)
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import export
-from warpsplat.fit.loop import Fit
-from warpsplat.fit.problem import Run
+from warpsplat.fit.problem import Fit, Run
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.fit.step import model_for
 from warpsplat.metrics import Score, psnr, score_svg, similarities
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import render
 from warpsplat.run.memory import PROGRAM, SSIMULACRA2, Reduction, memory_limit
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
 
 QUICK_PIXELS = 1_000_000
 """Size up to which an interrupted run is still scored, and a score that has begun is finished [pixels]: it
@@ -72,18 +73,21 @@ def render_figures(
     scene: Scene, target: FloatArray, settings: Settings, backend: Backend
 ) -> tuple[float, float | None]:
     """Return PSNR [dB] and SSIM of the settings' render of ``scene`` against ``target``, both in 8 bits."""
+    from warpsplat.fit.step import model_for
+    from warpsplat.rendering.renderer import render
+
     shown = np.round(255 * np.clip(render(scene, model=model_for(settings, 0), backend=backend), 0, 1))
     wanted = np.round(255 * target)
     return psnr(shown, wanted), similarities(shown, wanted)[0]
 
 
 def render_score(
-    made: Fit, target: FloatArray, settings: Settings, backend: Backend, reduction: Reduction | None
+    made: Fit, target: FloatArray, settings: Settings, run: Run, reduction: Reduction | None
 ) -> tuple[float, float | None]:
     """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
     small = not reduction and target[..., 0].size <= settings.fine_pixels
     if renderer_of(settings.renderer).soft and small:
-        return render_figures(made.scene, target, settings, backend)
+        return render_figures(made.scene, target, settings, run.backend)
     return made.render_psnr, None
 
 

@@ -17,8 +17,8 @@ from PIL import Image
 from warpsplat.errors import ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.loop import Fit
 from warpsplat.fit.options import limits_of
+from warpsplat.fit.problem import Fit
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import Rows, Score, score_svg

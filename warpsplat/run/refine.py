@@ -96,7 +96,7 @@ def refine(
     problem = Problem(load_target(pixels, image_name, settings.background), settings)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
-        saved = kept.open(identity("refine", settings, problem, text), backend) if kept else None
+        saved = kept.open(identity("refine", settings, problem, text), backend()) if kept else None
         run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:

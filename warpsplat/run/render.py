@@ -60,7 +60,7 @@ def render(
         own = size_of(text, svg_name_of(scene))
         zoom = zoom_of(own, width, height, scale)
         with backend_on(device, threads) as backend:
-            return _with_opacity(_draw_svg(text, own, renderer, zoom, backend))
+            return _with_opacity(_draw_svg(text, own, renderer, zoom, backend()))
     size = (scene.canvas.width, scene.canvas.height)
     zoom = zoom_of(size, width, height, scale)
     if renderer == "viewer":
@@ -68,7 +68,7 @@ def render(
     viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
     with backend_on(device, threads) as backend:
         model = renderer_of(renderer).default_model
-        return _with_opacity(render_into(scene, viewport, model=model, backend=backend))
+        return _with_opacity(render_into(scene, viewport, model=model, backend=backend()))
 
 
 def zoom_of(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 import os
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -42,11 +43,12 @@ class Result:
     score: Score | None
     """Score of the SVG as resvg shows it; None if the run was stopped before that."""
     render_psnr: float
-    """PSNR of the last training render against the image, at its size [dB]. With soft Gaussians, if the image
-    is no larger than that size: of the finished scene in 8 bits, like the file's.
+    """PSNR of the last training render against the image, at its size [dB]; NaN: a draft of a drawing is
+    not rendered. With soft Gaussians, if the image is no larger than that size: of the finished scene in 8
+    bits, like the file's.
     """
     estimated_psnr: float
-    """PSNR of the file at that size, as estimated by the training [dB]."""
+    """PSNR of the file at that size, as estimated by the training [dB]; NaN likewise."""
     iterations: int
     """Steps done; fewer than asked for when stopped."""
     seconds: float
@@ -96,9 +98,9 @@ class Result:
             "subject": self.subject,
             "why": self.why,
             "renderer": self.renderer,
-            "render_psnr": round(self.render_psnr, 3),
+            "render_psnr": _finite(self.render_psnr),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
-            "estimated_psnr": round(self.estimated_psnr, 3),
+            "estimated_psnr": _finite(self.estimated_psnr),
             "shapes": shapes,
             "curves": shapes,  # an older name, kept for scripts
             "iterations": self.iterations,
@@ -109,6 +111,11 @@ class Result:
             "missed": list(self.missed),
             "levels": [asdict(level) for level in self.levels],
         }
+
+
+def _finite(decibels: float) -> float | None:
+    """Return a PSNR for JSON, which has no other numbers than finite ones."""
+    return round(decibels, 3) if math.isfinite(decibels) else None
 
 
 def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from warpsplat.fit.loop import Fit
-from warpsplat.fit.problem import Run
+from warpsplat.fit.problem import Fit, Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
-from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 
 RELEASE_INTERVAL = 10
@@ -37,7 +35,13 @@ def report_end(made: Fit, run: Run, history: list[Progress]) -> None:
     """Report the end of the training, unless the last report already did."""
     if history and history[-1].work < 1 and not made.interrupted:
         scene = made.scene
-        snapshot = Snapshot(lambda: scene, lambda: render(scene, backend=run.backend))
+
+        def shown() -> FloatArray:
+            from warpsplat.rendering.renderer import render
+
+            return render(scene, backend=run.backend)
+
+        snapshot = Snapshot(lambda: scene, shown)
         last = replace(history[-1], work=1.0, fine=True, psnr=made.estimated_psnr, shapes=len(scene))
         run.report(replace(last, seconds=time.monotonic() - run.started, snapshot=snapshot))
 

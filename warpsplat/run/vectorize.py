@@ -15,7 +15,6 @@ from warpsplat.errors import UsageError, naming
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
-from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
@@ -35,6 +34,8 @@ from warpsplat.svg.page import placed
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+    from warpsplat.fit.loop import Start
 
 
 @takes(Options)
@@ -101,7 +102,7 @@ def vectorize(
     write = None if output is None else functools.partial(write_named, Path(output))
     with backend_on(device, threads) as backend:
         prepared = prepare(image, settings, name=name, importance=importance, keyed=keyed)
-        saved = kept.open(identity("vectorize", settings, prepared.problem), backend) if kept else None
+        saved = kept.open(identity("vectorize", settings, prepared.problem), backend()) if kept else None
         result = make_result(prepared, Run(backend, callback, stop, checkpoint=saved), write)
     if kept and not result.stopped:
         kept.path.unlink(missing_ok=True)
@@ -125,11 +126,16 @@ def make_result(
     run = timed(recorded(run, history), settings, target)
     strategy = choose_strategy(settings) if start is None else STRATEGIES["fit"]
     with naming(image.name):
-        made = strategy.make(problem, run) if start is None else fit(problem, run, start)
+        if start is None:
+            made = strategy.make(problem, run)
+        else:
+            from warpsplat.fit.loop import fit
+
+            made = fit(problem, run, start)
         report_end(made, run, history)
         if checkpoint and made.interrupted:
             checkpoint.save()
-        made = arranged(made, problem, strategy, run.backend)
+        made = arranged(made, problem, strategy, run)
         if reduction:
             made, settings = reduction.enlarged(made), reduction.settings(settings)
         release_memory()
@@ -141,7 +147,7 @@ def make_result(
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
         score = score.of_file(file) if score else None
-        render_psnr, render_ssim = render_score(made, target, settings, run.backend, reduction)
+        render_psnr, render_ssim = render_score(made, target, settings, run, reduction)
         seconds = time.monotonic() - begun
         result = Result(
             svg=file,

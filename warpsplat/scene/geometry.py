@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,9 @@ from warpsplat.scene.scene import FloatArray, Scene
 
 PIECES = 8
 """Straight pieces of a Bézier from which areas and boxes are computed."""
+
+ARC_HANDLE = 4 * (math.sqrt(2) - 1) / 3
+"""Handles of the cubic nearest to a quarter of a circle, over its radius."""
 
 
 def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:

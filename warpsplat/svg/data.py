@@ -22,6 +22,7 @@ from warpsplat.svg.commands import (
     shortest_ring,
     shortest_smooth,
 )
+from warpsplat.svg.primitives import held_primitives, primitives
 
 
 def integers(pairs: Iterable[Pair]) -> str:
@@ -59,12 +60,14 @@ def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
 
 
 def held_points(scene: Scene, exact: Floats) -> Floats:
-    """Return the points of a file: whole numbers, and handles of lines at the thirds."""
+    """Return the points of a file: whole numbers, but for handles of lines, at the thirds, and of arcs."""
     rows = cubic_rows(scene)
     rows = rows[straight_cubics(scene, exact)[rows[:, 0]]]
     held = np.round(exact)
     a, b = held[rows[:, 0]], held[rows[:, 3]]
     held[rows[:, 1]], held[rows[:, 2]] = (2 * a + b) / 3, (a + 2 * b) / 3
+    for own, points in held_primitives(scene, exact):
+        held[own] = points
     return held
 
 
@@ -97,6 +100,7 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
     contours = np.searchsorted(scene.starts, scene.first).tolist()
     strokes = scene.kind == Kind.STROKE
     # A fill closes its contours, a stroke does not, and its dashes depend on the start.
+    arcs = {i: made.rounded() for i, made in primitives(scene, exact) if made.radii[0] > 0}
     stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
     for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):
         texts = []
@@ -106,6 +110,11 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
             if is_spline:
                 texts.append(spline_data(grid[rows], closed[contour], may_rotate=not stroked[shape]))
                 texts.append("z" if closed[contour] and stroked[shape] else "")
+                continue
+            made = None if stroked[shape] else arcs.get(contour)
+            if made:
+                text, pen = made.data(pen)
+                texts.append(text)
                 continue
             segments = segments_of(
                 grid[rows], straight[rows][: rows.stop - rows.start - 2 : 3], closed[contour]

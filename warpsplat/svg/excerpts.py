@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
+from html import escape
 from xml.parsers import expat
-from xml.sax.saxutils import escape
 
 from warpsplat.errors import ImageError
 from warpsplat.svg.css import ancestors, rules, split_at_rules
@@ -102,7 +102,7 @@ class Excerpts:
                     raise ImageError(f"uses the style sheet selector {selector[:40]!r}, which cannot be kept")
             scoped = ",".join(f".{scope} {selector.strip()}" for selector in selectors.split(","))
             texts.append(f"{scoped}{{{body.strip()}}}")
-        return f"<style>{escape(''.join(texts))}</style>" if texts else ""
+        return f"<style>{escape(''.join(texts), quote=False)}</style>" if texts else ""
 
     def _slice(self, start: int, end: int) -> str:
         text = self._data[start:end].decode("utf-8", "surrogatepass")

@@ -72,10 +72,12 @@ def _rect(x: float, y: float, width: float, height: float, rx: float, ry: float)
     if not (rx > 0 and ry > 0):
         return f"M{x!r} {y!r}h{width!r}v{height!r}h{-width!r}z"
     across, down = width - 2 * rx, height - 2 * ry
+    right, left = (f"h{across!r}", f"h{-across!r}") if across else ("", "")
+    descent, ascent = (f"v{down!r}", f"v{-down!r}") if down else ("", "")
     arc = f"a{rx!r} {ry!r} 0 0 1 "
     return (
-        f"M{x + rx!r} {y!r}h{across!r}{arc}{rx!r} {ry!r}v{down!r}{arc}{-rx!r} {ry!r}"
-        f"h{-across!r}{arc}{-rx!r} {-ry!r}v{-down!r}{arc}{rx!r} {-ry!r}z"
+        f"M{x + rx!r} {y!r}{right}{arc}{rx!r} {ry!r}{descent}{arc}{-rx!r} {ry!r}"
+        f"{left}{arc}{-rx!r} {-ry!r}{ascent}{arc}{rx!r} {-ry!r}z"
     )
 
 

@@ -59,10 +59,13 @@ class PathElement:
     shared: tuple[str, ...]
     """Attributes that neighbours may have in common, the outermost group's first: opacity, paint, line."""
     own: str = ""
+    element: str = ""
+    """A circle, ellipse or rectangle that is the same, with its geometry; empty: a path."""
 
     def __str__(self) -> str:
         outermost, *inner = self.shared
-        return f'<path d="{self.data}"{"".join(inner)}{self.own}{outermost}/>'
+        element = self.element or f'path d="{self.data}"'
+        return f"<{element}{''.join(inner)}{self.own}{outermost}/>"
 
     def without(self, attributes: Sequence[object]) -> PathElement:
         """Return the path without the shared attributes for which ``attributes`` has a true value."""

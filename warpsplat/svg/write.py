@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from xml.sax.saxutils import escape
+from html import escape
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
+from warpsplat.svg.primitives import primitives
 
 OPACITY_DECIMALS = 2
 """Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
@@ -81,6 +82,7 @@ class _Paths:
         """``ramps``: identifiers of gradients by shape; the rest is as for ``write_svg``."""
         self._scene, self._per_pixel = scene, per_pixel
         self._data = list(path_data(scene, per_pixel))
+        self._elements = _basic_shapes(scene, per_pixel)
         self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
@@ -108,9 +110,8 @@ class _Paths:
         style = self._style(shape, in_group=in_group)
         if self._scene.kind[shape] == Kind.STROKE:
             return PathElement(self._data[shape], (opacity, paint, style), own)
-        return PathElement(
-            self._data[shape], (opacity, "" if paint == BLACK_FILL else paint, ""), style + own
-        )
+        shared = (opacity, "" if paint == BLACK_FILL else paint, "")
+        return PathElement(self._data[shape], shared, style + own, self._elements.get(shape, ""))
 
     def _style(self, shape: int, *, in_group: bool) -> str:
         """Return the attributes besides paint; those of the group of strokes are left out if ``in_group``."""
@@ -131,6 +132,24 @@ class _Paths:
             style += f' stroke-dasharray="{" ".join(pattern)}"'
             style += f' stroke-dashoffset="{offset}"' if offset != "0" else ""
         return style
+
+
+def _basic_shapes(scene: Scene, per_pixel: float) -> dict[int, str]:
+    """Return the circles, ellipses and rectangles among the shapes, as elements without style.
+
+    Pixel art stays of one kind, and a rectangle that covers the canvas is no background.
+    """
+    if scene.canvas.crisp:
+        return {}
+    size = np.array([scene.canvas.width, scene.canvas.height]) * per_pixel
+    alone = np.diff(np.searchsorted(scene.starts, scene.first)) == 1
+    alone &= ~(scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
+    owner, found = scene.contour_shapes().tolist(), {}
+    for contour, made in primitives(scene, scene.points.astype(np.float64) * units(scene, per_pixel)):
+        held = made.rounded()
+        if held and alone[owner[contour]] and (held.low > np.zeros(2)).any() | (held.high < size).any():
+            found[owner[contour]] = held.element()
+    return found
 
 
 def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
@@ -282,7 +301,7 @@ UNPRINTABLE = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 def titled(title: str) -> str:
     """Return a ``title`` element, or nothing for an empty title."""
-    return f"<title>{escape(UNPRINTABLE.sub('', title))}</title>" if title else ""
+    return f"<title>{escape(UNPRINTABLE.sub('', title), quote=False)}</title>" if title else ""
 
 
 def head_of(width: object, height: object, view: str) -> str:

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from warpsplat.batch.executors.tasks import OnProgress, Outcome, Stop, Task
 from warpsplat.errors import WarpsplatError, explain, printable
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.device import choose_device, start_warp
-from warpsplat.rendering.device_lock import device_lock
+from warpsplat.run.arguments import backend_on
 from warpsplat.run.command_line import vectorize_command
 from warpsplat.run.formats import named_bytes
 from warpsplat.run.prepare import load_target, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.vectorize import make_result
 from warpsplat.svg.inspect import svg_text
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
 
 
 def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
@@ -56,11 +58,11 @@ def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
     def advance(progress: Progress) -> None:
         on_progress(task.number, progress.work)
 
-    backend, mask = _backend(task), None
+    mask = None
     if task.mask is not None:
         mask = io.BytesIO(task.mask)
         mask.name = task.mask_name
-    with device_lock(backend.device):
+    with backend_on(task.device, task.threads) as backend:
         prepared = prepare(task.image, task.settings, name=task.name, importance=mask, keyed=True)
         result = make_result(prepared, Run(backend, advance, stop))
         data = named_bytes(Path(task.output), result.svg, key=STOPPED if result.stopped else task.key)
@@ -76,18 +78,12 @@ def _measured(task: Task, data: bytes) -> Outcome:
     outcome = Outcome(task.number, "measured", task.key, data, score.as_dict())
     if not task.report_back:
         return outcome
-    backend = _backend(task)
-    with device_lock(backend.device):
+    with backend_on(task.device, task.threads) as backend:
         return _with_report(outcome, task, svg, backend)
 
 
-def _backend(task: Task) -> Backend:
-    start_warp()
-    return Backend.on(choose_device(task.device), task.threads)
-
-
 def _with_report(
-    outcome: Outcome, task: Task, svg: str, backend: Backend, result: Result | None = None
+    outcome: Outcome, task: Task, svg: str, backend: Callable[[], Backend], result: Result | None = None
 ) -> Outcome:
     """Return an outcome with the page on its SVG if one is requested, or with the error that prevented it.
 
@@ -103,7 +99,7 @@ def _with_report(
         page = report_page(
             svg,
             task.image,
-            backend,
+            backend(),
             Facts.of(result, line) if result else Facts(figures, command=line),
             name=os.path.basename(task.name),
             svg_name=f"{os.path.basename(task.output).rpartition('.')[0]}.svg",

@@ -9,10 +9,10 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import DEPENDENT, determinant, eigh, product, solve
+from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.scene.scene import starts_of
 
-HANDLE = 4 * (np.sqrt(2) - 1) / 3  # length of the handles of a quarter of the unit circle
-QUARTER = np.array([(1, 0), (1, HANDLE), (HANDLE, 1), (0, 1)])
+QUARTER = np.array([(1, 0), (1, ARC_HANDLE), (ARC_HANDLE, 1), (0, 1)])
 TURN = np.array([(0, -1), (1, 0)])
 LEAST_POINTS = 6  # that tell an ellipse from any other outline
 LONGEST = 20  # axis of an ellipse, over its other one

@@ -128,6 +128,8 @@ def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
         rows: Row of the upper left pixel of each crossing.
         columns: Its column.
     """
+    if not len(rows):
+        return np.zeros(0, np.bool_)
     a, b = image[rows, columns], image[rows, columns + 1]
     c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
     soft = filters.box_blur(np.asarray(image, np.float32), SURROUNDINGS)

@@ -96,8 +96,8 @@ class HiddenPaths:
     cover: Cover
     rank: Ints
     """Of the region that each path is hidden from, shape (path,)."""
-    through_holes: Bools
-    """Whether what is above has holes, through which the path must not be seen; shape (path,)."""
+    has_holes: bool
+    """Whether what is above may have holes, through which a path must not be seen."""
     first: Ints
     """First goal of each path and, last, the number of goals, shape (path + 1,)."""
     goals: Floats
@@ -154,7 +154,7 @@ class HiddenPaths:
         free = beside <= 2 * CUT_OFF
         kept = np.flatnonzero(free)
         free[kept] = self.cover.hides_lines(self.rank[path[kept]], self.goals[i[kept]], self.goals[j[kept]])
-        for number in np.flatnonzero(free & self.through_holes[path]).tolist():
+        for number in np.flatnonzero(free & self.has_holes).tolist():
             low, high = int(i[number]), int(j[number])
             polygon = np.concatenate([self.vertices[low : high + 1], self.goals[[high, low]]])
             free[number] = self.cover.hides_polygon(int(self.rank[path[number]]), polygon)

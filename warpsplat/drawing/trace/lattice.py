@@ -126,7 +126,9 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
     longest = min(PERIODS[1], size / CELLS[0])
     turns = np.arange(int(np.ceil(TURN / longest)), int(TURN / PERIODS[0]) + 1, 1 + (size > SAMPLES // 2))
     lines = np.arange(len(edges)) + first + 1
-    waves = (_turn()[:, turns[:, None] * lines % TURN] * edges).sum(axis=2)
+    some = edges > 0
+    places = turns.astype(np.int32)[:, None] * lines[some].astype(np.int32) % TURN
+    waves = np.stack([(wave[places] * edges[some]).sum(axis=1) for wave in _turn()])
     coherence = np.sqrt(np.square(waves.astype(np.float64)).sum(axis=0)) / (AMPLITUDE * total)
     if not len(turns) or coherence.max() < COHERENCE:
         return None

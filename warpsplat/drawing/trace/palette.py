@@ -59,7 +59,7 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
     sums = np.stack([np.bincount(owners, channel, count) for channel in pixels.T], axis=1)
     means = sums.astype(np.float64) / sizes[:, None]
     modes = _modes(pixels, owners, count)
-    off = channel_max(np.abs(pixels - modes[owners])).astype(np.float32)
+    off = channel_max(np.abs(pixels - modes.astype(np.float32)[owners]))
     residual = np.sqrt(np.bincount(owners, off.astype(np.float64) ** 2, count) / sizes)
     is_large = sizes >= (LEAST_RAMP if noise == 0 else LEAST_NOISY_RAMP)
     paint = np.full(count, NO_REGION, np.int32)
@@ -76,11 +76,14 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
     shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[flat], sizes[flat], noise)
     paint[flat] = len(colorings) + shared
     fills = image.copy()
-    is_flat = np.isin(owners, flat)
     colors = np.array([coloring.color for coloring in flat_colorings]).reshape(-1, image.shape[2])
-    every = np.zeros((count, image.shape[2]))
+    every = np.zeros((count, image.shape[2]), np.float32)
     every[flat] = colors[shared]
-    fills[inside] = np.where(is_flat[:, None], every[owners], pixels)
+    is_flat = np.zeros(count, np.bool_)
+    is_flat[flat] = True
+    whole = inside.copy()
+    whole[inside] = is_flat[owners]
+    fills[whole] = every[labels[whole]]
     return Parts(labels, fills, paint, colorings + flat_colorings)
 
 

@@ -69,12 +69,16 @@ def find_loops(labels: Ints, image: Floats) -> Loops:
         (in_x, in_y), (out_x, out_y) = INSIDE[direction], OUTSIDE[direction]
         step_x, step_y = STEPS[direction]
         is_level = direction in (RIGHT, LEFT)
-        ys, xs = np.mgrid[0 : height + 1, 0 : width + 1]
-        begins = slice(1, None) if direction in (LEFT, UP) else slice(None, -1)
-        ys, xs = (ys[:, begins], xs[:, begins]) if is_level else (ys[begins], xs[begins])
-        mine, theirs = padded[ys + in_y + 1, xs + in_x + 1], padded[ys + out_y + 1, xs + out_x + 1]
-        real = mine != theirs
-        ys, xs, mine, theirs = ys[real], xs[real], mine[real], theirs[real]
+        # Cracks begin at all vertices but those of one border.
+        first = int(direction in (LEFT, UP))
+        top, left = (0, first) if is_level else (first, 0)
+        rows, columns = (height + 1, width) if is_level else (height, width + 1)
+        within = padded[top : top + rows + 1, left : left + columns + 1]
+        mine = within[in_y + 1 :, in_x + 1 :][:rows, :columns]
+        theirs = within[out_y + 1 :, out_x + 1 :][:rows, :columns]
+        ys, xs = np.nonzero(mine != theirs)
+        mine, theirs = mine[ys, xs], theirs[ys, xs]
+        ys, xs = ys + top, xs + left
         end_y, end_x = ys + step_y, xs + step_x
         ahead = padded[end_y + in_y + 1, end_x + in_x + 1]
         ahead_left = padded[end_y + out_y + 1, end_x + out_x + 1]

@@ -160,7 +160,10 @@ def find_stretches(layers: Layers) -> Stretches:
     above = layers.hiding[np.maximum(others, 0)] > layers.ranks[loops.region[chosen]][owner]
     kinds = np.where(others == NO_REGION, EDGE, np.where(above, HIDDEN, SEEN))
     hidden = np.bincount(owner, kinds != HIDDEN, len(chosen)) == 0
-    holed = np.bincount(owner, layers.holed[others], len(chosen)) > 0
+    # Something transparent may lie anywhere in a hole, not at its border alone.
+    outer = ~loops.is_hole
+    networks = np.bincount(loops.network[outer], layers.holed[loops.region[outer]], loops.network.max() + 1)
+    holed = networks[loops.network[chosen]] > 0
     # What has no boundary that is seen is drawn all the same, if it is no hole. A hole of it is left open, a
     # little smaller than what lies over it, where that is transparent inside.
     kinds[(hidden & ~loops.is_hole[chosen])[owner]] = SEEN
@@ -323,7 +326,7 @@ def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[in
     loops, last = stretches.layers.loops, stretches.cracks[begin + counts - 1]
     vertices[inner - 1] = loops.vertices[stretches.cracks[index]]
     vertices[first[1:] - 2] = vertices[first[1:] - 1] = loops.vertices[last]
-    others = loops.others[stretches.cracks[index]]
-    holed = np.logical_or.reduceat(stretches.layers.holed[others], first[:-1] - 2 * np.arange(len(hidden)))
+    # Something transparent may lie between regions as well as inside one.
+    holed = bool(stretches.layers.holed.any())
     paths = HiddenPaths(stretches.layers.cover, stretches.rank[hidden], holed, first, goals, vertices)
     return dict(zip(hidden.tolist(), paths.corners(), strict=True))

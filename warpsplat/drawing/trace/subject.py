@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, depth, dilated
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, depth, dilated
 from warpsplat.drawing.trace.lattice import CELLS, MOST_COLORS, find_lattice
 from warpsplat.drawing.trace.pixels import changes
 from warpsplat.portable.sequences import convolve
@@ -67,15 +67,16 @@ def _guess(image: FloatArray) -> Guess:
     cells = _cells(image, counts)
     if cells is not None:
         return Guess("pixel", cells)
+    usual = colors[counts.argmax()].astype(np.int16)
     step = _step(part)
     edges = step > EDGE
     share = (step > 2 * EDGE).mean()
-    ground = (np.abs(part - colors[counts.argmax()]).max(axis=2) <= NEAR_GROUND).mean()
+    ground = (channel_max(np.abs(part - usual)) <= NEAR_GROUND).mean()
     if share > DITHERED and (ground < GROUND or _isolated(part) > SPECKLED):
         return Guess("photo", f"{share:.0%} of the pixels are edges")
     if min(height, width) >= LEAST_LINE_SIDE and _is_line_art(part):
         return Guess("line", "thin ink on paper")
-    paper = (part == colors[counts.argmax()]).all(axis=2)
+    paper = (part == usual).all(axis=2)
     beside = dilated(edges, 3)
     if (paper | ~beside).mean() < GRAINY:
         few = _few_colors(part, np.zeros_like(edges), blurs=2)
@@ -117,8 +118,8 @@ def _isolated(levels: Ints) -> float:
 
 def _step(levels: Ints) -> Ints:
     """Return the largest step to any of the four neighbours, over the channels, shape (height, width)."""
-    right = np.abs(np.diff(levels, axis=1)).max(axis=2)
-    below = np.abs(np.diff(levels, axis=0)).max(axis=2)
+    right = channel_max(np.abs(np.diff(levels, axis=1)))
+    below = channel_max(np.abs(np.diff(levels, axis=0)))
     step = np.zeros(levels.shape[:2], np.int16)
     for part in (slice(1, None), slice(None, -1)):
         step[:, part] = np.maximum(step[:, part], right)
@@ -202,8 +203,8 @@ def _is_line_art(levels: Ints) -> bool:
 def _evenness(levels: Ints, step: Ints, rest: Bools) -> float:
     """Return the share of flat or evenly changing pixels among ``rest``, those away from paper and edges."""
     bend = np.zeros(levels.shape[:2], np.int16)
-    bend[:, 1:-1] = np.abs(np.diff(levels, n=2, axis=1)).max(axis=2)
-    bend[1:-1] = np.maximum(bend[1:-1], np.abs(np.diff(levels, n=2, axis=0)).max(axis=2))
+    bend[:, 1:-1] = channel_max(np.abs(np.diff(levels, n=2, axis=1)))
+    bend[1:-1] = np.maximum(bend[1:-1], channel_max(np.abs(np.diff(levels, n=2, axis=0))))
     if rest.sum() < 0.002 * rest.size:
         return 1.0  # paper and edges only
     return float(max((step[rest] <= 1).mean(), (bend[rest] <= 1).mean()))

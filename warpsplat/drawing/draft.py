@@ -1,0 +1,99 @@
+"""Drawings and pixel art as they are traced: no fit, and no render but the viewer's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
+from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.fit.export import finished
+from warpsplat.fit.palette import Palette, solid_shapes
+from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.rounding import finest
+from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.metrics import psnr_of_file
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.geometry import enlarged
+
+LEAST_ORIGINAL_SIDE = 96
+"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
+
+DRAFT_GRID = 8.0
+"""View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
+
+
+def draft_regions(problem: Problem, run: Run) -> Fit:
+    """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions."""
+    settings = problem.settings
+
+    def sketch(most: int | None) -> Sketch:
+        made = _best_if_thin(problem, run, most)
+        return Sketch(made, len(finished(made.scene, settings, made.per_pixel).encode()), None)
+
+    first = sketch(None if settings.simplify else settings.curves)
+    if not settings.max_bytes or first.size <= settings.max_bytes:
+        return first.fit
+    best = best_within(first, settings.max_bytes, sketch, lambda drawing, price: first, run.over)
+    return replace(best, interrupted=run.stopped())
+
+
+def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
+    """Trace an image; one of few rows or columns also continued beyond its borders, or as cells."""
+    size, settings = enlargement(problem.target), problem.settings
+
+    def traced(across: int = 0, down: int = 0) -> Fit:
+        scene = trace(continued(original(problem.target), across, down), most=most).scene
+        if settings.is_limited:
+            scene = limited(scene.take(solid_shapes(scene)), settings)
+        scene = enlarged(cut(scene, across, down), size, *problem.size)
+        per_pixel = min(DRAFT_GRID, finest(settings)) / size
+        if settings.max_bytes or any(margin):
+            return as_fit(scene, per_pixel, problem, run)
+        return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
+
+    margin = margins(problem.target, THIN_SIDE)
+    if not any(margin):
+        return traced()
+    others = [lambda: traced(*margin), lambda: draw_pixels(problem, run)]
+    return best_of_thin(traced(), others[: 1 if most is not None else 2])
+
+
+def draw_pixels(problem: Problem, run: Run) -> Fit:
+    """Trace pixel art, a shape for each area of cells of one colour."""
+    scene, per_pixel = trace_pixels(problem.target, solid_color(problem.settings.background))
+    if problem.settings.is_limited:
+        scene = limited(scene.take(solid_shapes(scene)), problem.settings)
+    return replace(as_fit(scene, per_pixel, problem, run), interrupted=False)
+
+
+def as_fit(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
+    """Return a traced scene as a fit: its PSNR is that of its file."""
+    figure = psnr_of_file(finished(scene, problem.settings, per_pixel), problem.target)
+    return Fit(scene, per_pixel, figure, figure, 0, run.stopped())
+
+
+def enlargement(image: FloatArray) -> int:
+    """Return how many times an image was enlarged by repeating its pixels.
+
+    Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
+    """
+    size, side = cell_size(image), min(image.shape[:2])
+    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_ORIGINAL_SIDE)
+    return max(fits, default=1)
+
+
+def original(target: FloatArray) -> FloatArray:
+    """Return an image as it was before it was enlarged."""
+    size = enlargement(target)
+    return np.ascontiguousarray(target[::size, ::size])
+
+
+def limited(scene: Scene, settings: Settings) -> Scene:
+    """Return ``scene`` in the colours that the settings allow."""
+    palette = Palette.of_scene(settings, scene)
+    return palette.limited(scene) if palette else scene

@@ -1,0 +1,152 @@
+"""The nearest circles, ellipses and rectangles to outlines, by least squares, for many outlines at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.portable.elementary import hypot
+from warpsplat.portable.linear import solve
+from warpsplat.svg.primitives import Primitive
+
+Floats = npt.NDArray[np.float64]
+
+ROUNDS = 12  # of Gauss and Newton's method
+STEP = 1e-4  # [px] of numeric derivatives
+DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
+LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
+FIRST_REACH, LAST_REACH = (
+    0.5,
+    0.5,
+)  # [half the size] at first, [px] in the end: samples farther off count little
+
+
+class Samples(NamedTuple):
+    """Points of outlines with equally many of them."""
+
+    points: Floats
+    """Shape (outline, sample, 2) [px]."""
+    weights: Floats
+    """By which squared distances count: what a distance costs in the image, shape (outline, sample)."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of basic shape, by half its sides and the radii of its corners."""
+
+    values: tuple[str, ...]
+    """Kinds of its free values: the centre's two coordinates first, then sizes."""
+    size: int
+    """About its bytes in a file: path data with arcs have as many as an element."""
+    boxes: Callable[[Floats], tuple[Floats, Floats]]
+    """Half the sides and the radii, both (outline, 2), by the free sizes (outline, size)."""
+
+
+def _circle(sizes: Floats) -> tuple[Floats, Floats]:
+    half = np.repeat(sizes, 2, axis=1)
+    return half, half
+
+
+def _pill(sizes: Floats) -> tuple[Floats, Floats]:
+    return sizes, np.repeat(sizes.min(axis=1, keepdims=True), 2, axis=1)
+
+
+def _rounded(sizes: Floats) -> tuple[Floats, Floats]:
+    half = sizes[:, :2]
+    return half, np.repeat(np.minimum(sizes[:, 2:], half.min(axis=1, keepdims=True)), 2, axis=1)
+
+
+FAMILIES = (
+    Family(("x", "y", "side"), 38, _circle),
+    Family(("x", "y", "side", "side"), 22, lambda sizes: (sizes, np.zeros_like(sizes))),
+    Family(("x", "y", "side", "side"), 42, lambda sizes: (sizes, sizes)),
+    Family(("x", "y", "side", "side"), 50, _pill),
+    Family(("x", "y", "side", "side", "radius"), 56, _rounded),
+)
+"""Circles, rectangles, ellipses, and rectangles with round ends and with round corners."""
+
+
+def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
+    """Return signed distances, about, of points from boxes around 0 with rounded corners.
+
+    Args:
+        points: Shape (outline, sample, 2).
+        half: Half the sides, shape (outline, 2).
+        radii: Shape (outline, 2); unequal ones only of ellipses.
+    """
+    x, y = np.abs(points[..., 0]), np.abs(points[..., 1])
+    a, b = half[:, :1], half[:, 1:]
+    is_ellipse = (radii == half).all(axis=1, keepdims=True)
+    level = np.maximum(hypot(x / a, y / b), 1e-9)
+    slope = np.maximum(hypot(x / (a * a), y / (b * b)), 1e-9)
+    r = radii[:, :1]
+    u, v = x - (a - r), y - (b - r)
+    boxed = hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0) - r
+    return np.where(is_ellipse, (level - 1) * level / slope, boxed)
+
+
+class Fits(NamedTuple):
+    """The nearest shapes of a family."""
+
+    values: Floats
+    """Shape (outline, value) [px]."""
+    stiffness: Floats
+    """Growth of the weighted squares with the square of each value's change, shape (outline, value)."""
+    off: Floats
+    """Distances of the samples, shape (outline, sample) [px]."""
+
+
+def nearest(family: Family, samples: Samples) -> Fits:
+    """Return the shapes of a family nearest to most of the samples, by weighted least squares.
+
+    Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
+    """
+    points, weights = samples
+    values = _start(family, samples)
+    reach = FIRST_REACH * values[:, 2:].max(axis=1)
+    unit = np.eye(values.shape[1])
+
+    def off(values: Floats) -> Floats:
+        half, radii = family.boxes(values[:, 2:])
+        return distances(points - values[:, None, :2], half, radii)
+
+    for _ in range(ROUNDS):
+        here = off(values)
+        slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit], axis=2)
+        trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2
+        weighted = slopes * trust[..., None]
+        system = np.stack([(weighted * slopes[..., k, None]).sum(axis=1) for k in range(len(unit))], axis=1)
+        stiffness = np.diagonal(system, axis1=1, axis2=2)
+        damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
+        values = values - solve(damped, (weighted * here[..., None]).sum(axis=1)[..., None])[..., 0]
+        values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
+        reach = np.maximum(reach / 2, LAST_REACH)
+    return Fits(values, stiffness, off(values))
+
+
+def _start(family: Family, samples: Samples) -> Floats:
+    """Return centres and sizes from the samples' boxes, shape (outline, value)."""
+    low, high = samples.points.min(axis=1), samples.points.max(axis=1)
+    center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)
+    least = half.min(axis=1, keepdims=True)
+    sizes = (
+        np.concatenate([half, 0.5 * least], axis=1) if len(family.values) > 3 else half.mean(1, keepdims=True)
+    )
+    return np.concatenate([center, sizes], axis=1)[:, : len(family.values)]
+
+
+def shape_of(family: Family, values: Floats, *, is_clockwise: bool) -> Primitive:
+    """Return the shape with some values, shape (value,)."""
+    half, radii = (x[0] for x in family.boxes(values[None, 2:]))
+    (x, y), (a, b), (rx, ry) = values[:2].tolist(), half.tolist(), radii.tolist()
+    return Primitive((x - a, y - b), (x + a, y + b), (rx, ry), is_clockwise)
+
+
+def areas(family: Family, values: Floats) -> Floats:
+    """Return the areas of shapes [px²]."""
+    half, radii = family.boxes(values[:, 2:])
+    return np.asarray(4 * half.prod(axis=1) - (4 - np.pi) * radii.prod(axis=1))

@@ -1,0 +1,258 @@
+"""Outlines that the image shows no different from circles, ellipses and rectangles become just that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
+from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
+from warpsplat.drawing.primitive_fits import areas as shape_areas
+from warpsplat.drawing.trace.beziers import points_at
+from warpsplat.drawing.trace.contours import joints_of
+from warpsplat.drawing.trace.curves import Pieces
+from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
+from warpsplat.kernels.constants import NONE
+from warpsplat.portable.elementary import hypot
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.scene import starts_of
+from warpsplat.svg.primitives import Primitive
+
+Floats = npt.NDArray[np.float64]
+
+MOST_PIECES = 24
+"""Outlines of more pieces are no basic shapes."""
+
+SAMPLES_PER_PIECE = 12
+
+MOST_OFF = 0.6
+"""Largest distance of an outline from its basic shape [px]."""
+
+LEAST_SEEN = 0.6
+"""Least share of an outline that shows, by its length: what other shapes hide may be anywhere."""
+
+BESIDE = 1.5
+"""Distance from an outline at which the colours on both sides are those of the areas [px]."""
+
+SEEN = 1e-3
+"""Least squared difference of these colours of an outline that shows: 5 levels in each channel."""
+
+CUBIC_BYTES, LINE_BYTES, LEVEL_BYTES, MOVE_BYTES, NUMBER_BYTES = 19, 7, 4, 6, 3
+"""Bytes of a cubic, a line, a level or upright one, the beginning of a contour, and a number in a file."""
+
+CHECKS = 4
+"""Most renders that confirm replacements: those that cost too much are taken back."""
+
+
+Errors = Callable[[Drawing], Floats]
+"""Gives the share of each cell in a drawing's mean squared error, as ``drawing.cells.by_cell``."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A basic shape in place of a contour."""
+
+    contour: int
+    cubics: Floats
+    """Of the contour, shape (piece, 4, 2)."""
+    family: Family
+    values: Floats
+    """Shape (value,)."""
+    stiffness: Floats
+    """Error by the square of each value's change, shape (value,)."""
+    is_clockwise: bool
+    saved: float
+    """Bytes."""
+
+    @cached_property
+    def made(self) -> Primitive:
+        """The shape."""
+        return shape_of(self.family, self.values, is_clockwise=self.is_clockwise)
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The cells that it changes."""
+        return joined([*cells_around(self.cubics), *cells_around(self.made.cubics())])
+
+
+def with_shapes(
+    target: FloatArray, drawing: Drawing, errors_of: Errors, errors: Floats, worth: float
+) -> Drawing:
+    """Return a drawing with exact basic shapes where they cost less error than their bytes are worth.
+
+    Args:
+        target: The image, as for ``finish_drawing``.
+        drawing: Fitted.
+        errors_of: The judge of drawings.
+        errors: Those of the drawing.
+        worth: Mean squared error that a byte is worth.
+    """
+    left = with_equal_values(_candidates(target, drawing.scene, worth), worth)
+    for _ in range(CHECKS):
+        if not left:
+            break
+        made = _replaced(drawing, left)
+        growth = errors_of(made) - errors
+        taken = [one for one in left if sum_within(growth, one.cells) <= one.saved * worth]
+        if len(taken) == len(left):
+            return made
+        left = taken
+    return drawing
+
+
+def _candidates(target: FloatArray, scene: Scene, worth: float) -> list[Candidate]:
+    """Return the basic shape of each contour that is near to one, the cheapest by error and bytes."""
+    found = []
+    for group in scene.alike():
+        pieces = group.points.shape[1] // 3
+        if not 2 <= pieces <= MOST_PIECES:
+            continue
+        ring = np.concatenate([group.points, group.points[:, :1]], axis=1).astype(np.float64)
+        cubics = ring[:, 3 * np.arange(pieces)[:, None] + np.arange(4)]
+        samples, is_likely = _samples(target, cubics)
+        likely = np.flatnonzero(is_likely)
+        if not len(likely):
+            continue
+        samples, cubics = Samples(samples.points[likely], samples.weights[likely]), cubics[likely]
+        areas, sizes = _areas(samples.points), _sizes(cubics)
+        made = [nearest(family, samples) for family in FAMILIES]
+        costs = np.stack(
+            [_costs(f, fits, samples, areas, worth) for f, fits in zip(FAMILIES, made, strict=True)]
+        )
+        best = costs.argmin(axis=0)
+        for i in np.flatnonzero(np.isfinite(costs.min(axis=0))).tolist():
+            family, fits = FAMILIES[best[i]], made[best[i]]
+            saved = float(sizes[i]) - family.size
+            own = int(group.contours[likely[i]])
+            values = fits.values[i], fits.stiffness[i]
+            found.append(Candidate(own, cubics[i], family, *values, bool(areas[i] > 0), saved))
+    return found
+
+
+def with_equal_values(candidates: list[Candidate], worth: float) -> list[Candidate]:
+    """Return candidates with equal sizes and places where they differ by less than a number is worth.
+
+    Values of one kind are merged in pairs, those first that cost least (Ward 1963).
+    """
+    values = [one.values.copy() for one in candidates]
+    saved = [one.saved for one in candidates]
+    for kind in ("x", "y", "side", "radius"):
+        places = [
+            (i, k)
+            for i, one in enumerate(candidates)
+            for k, name in enumerate(one.family.values)
+            if name == kind
+        ]
+        exact = np.array([values[i][k] for i, k in places])
+        stiffness = np.array([candidates[i].stiffness[k] for i, k in places])
+        merged, counts = merge_near(exact, stiffness, NUMBER_BYTES * worth)
+        for (i, k), value, count in zip(places, merged.tolist(), counts.tolist(), strict=True):
+            values[i][k] = value
+            saved[i] += NUMBER_BYTES * (count - 1) / count
+    return [
+        replace(one, values=own, saved=bytes_)
+        for one, own, bytes_ in zip(candidates, values, saved, strict=True)
+    ]
+
+
+def merge_near(values: Floats, stiffness: Floats, price: float) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return values, near ones replaced by their mean, and how many each stands for.
+
+    Args:
+        values: Shape (value,).
+        stiffness: Cost of the square of each one's change.
+        price: Most that merging two groups may cost.
+    """
+    order = np.argsort(values, kind="stable")
+    mean, weight = values[order], np.maximum(stiffness[order], 1e-30)
+    size = np.ones(len(values), np.int64)
+    while len(mean) > 1:
+        cost = np.diff(mean) ** 2 * weight[1:] * weight[:-1] / (weight[1:] + weight[:-1])
+        k = int(cost.argmin())
+        if cost[k] > price:
+            break
+        mean[k] = (mean[k] * weight[k] + mean[k + 1] * weight[k + 1]) / (weight[k] + weight[k + 1])
+        weight[k] += weight[k + 1]
+        size[k] += size[k + 1]
+        mean, weight, size = (np.delete(x, k + 1) for x in (mean, weight, size))
+    found, counts = np.empty_like(values), np.empty(len(values), np.int64)
+    found[order], counts[order] = np.repeat(mean, size), np.repeat(size, size)
+    return found, counts
+
+
+def _samples(target: FloatArray, cubics: Floats) -> tuple[Samples, npt.NDArray[np.bool_]]:
+    """Return points of contours with their weights, and which of the contours mostly show.
+
+    A distance of 1 px along 1 px costs the squared difference of the colours on both sides, as a share of the
+    image's mean squared error. ``cubics``: shape (contour, piece, 4, 2).
+    """
+    t = (np.arange(SAMPLES_PER_PIECE) + 0.5) / SAMPLES_PER_PIECE
+    points = np.asarray(points_at(cubics, t).reshape(len(cubics), -1, 2), np.float64)
+    along = (np.roll(points, -1, axis=1) - np.roll(points, 1, axis=1)) / 2
+    lengths = np.maximum(hypot(along[..., 0], along[..., 1]), 1e-9)
+    normals = np.stack([-along[..., 1], along[..., 0]], axis=2) / lengths[..., None]
+    height, width = target.shape[:2]
+    sides = []
+    for side in (-BESIDE, BESIDE):
+        places = np.floor(points + side * normals).astype(np.intp)
+        x, y = np.clip(places[..., 0], 0, width - 1), np.clip(places[..., 1], 0, height - 1)
+        sides.append(target[y, x].astype(np.float64))
+    contrast = ((sides[1] - sides[0]) ** 2).sum(axis=2)
+    shows = contrast > SEEN
+    seen = (lengths * shows).sum(axis=1) >= LEAST_SEEN * lengths.sum(axis=1)
+    weights = np.where(shows, contrast, 0) * lengths / (3 * width * height)
+    return Samples(points, weights.astype(np.float64)), seen
+
+
+def _areas(points: Floats) -> Floats:
+    """Return the signed areas of polygons (contour, point, 2), those of clockwise ones positive."""
+    x, y = points[..., 0], points[..., 1]
+    return np.asarray((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2)
+
+
+def _sizes(cubics: Floats) -> Floats:
+    """Return about the bytes of contours (contour, piece, 4, 2)."""
+    chord = cubics[..., 3, :] - cubics[..., 0, :]
+    thirds = cubics[..., :1, :] + np.array([[1 / 3], [2 / 3]]) * chord[..., None, :]
+    is_line = np.abs(cubics[..., 1:3, :] - thirds).max(axis=(-1, -2)) < SAME_COORDINATE
+    is_level = is_line & (np.abs(chord).min(axis=-1) < SAME_COORDINATE)
+    size = np.where(is_level, LEVEL_BYTES, np.where(is_line, LINE_BYTES, CUBIC_BYTES))
+    return np.asarray(MOVE_BYTES + size.sum(axis=1))
+
+
+def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: float) -> Floats:
+    """Return the cost of each shape of a family, in error and bytes; infinite where it is too far off."""
+    far = np.abs(fits.off) > MOST_OFF
+    shown = samples.weights > 0
+    near = (shown & ~far).sum(axis=1) >= LEAST_SEEN * fits.off.shape[1]
+    missing = np.abs(np.abs(areas) - shape_areas(family, fits.values))
+    same = missing <= 4 * MOST_OFF * fits.values[:, 2:].max(axis=1)
+    cost = (samples.weights * np.minimum(np.abs(fits.off), MOST_OFF) ** 2).sum(axis=1) + worth * family.size
+    return np.where(near & (same | (far | ~shown).any(axis=1)), cost, np.inf)
+
+
+def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
+    """Return a drawing with basic shapes in place of contours."""
+    scene = drawing.scene
+    starts = scene.starts.tolist()
+    points = [scene.points[a:b] for a, b in pairwise(starts)]
+    joints = [drawing.joints[a:b] for a, b in pairwise(starts)]
+    for one in chosen:
+        cubics = one.made.cubics()
+        points[one.contour] = cubics[:, :3].reshape(-1, 2).astype(np.float32)
+        joints[one.contour] = joints_of(Pieces(cubics, _is_line(cubics))).astype(np.int32)
+    counts = np.array([len(own) for own in points], np.int32)
+    after = starts_of(counts)
+    first = after[np.searchsorted(scene.starts, scene.first)]
+    changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
+    return Drawing(changed, np.concatenate(joints), np.full(len(changed.points), NONE, np.int32))
+
+
+def _is_line(cubics: Floats) -> npt.NDArray[np.bool_]:
+    """Return which pieces of a basic shape are lines: level or upright."""
+    return np.asarray((np.abs(cubics[:, 3] - cubics[:, 0]) < SAME_COORDINATE).any(axis=1))

@@ -1,0 +1,170 @@
+"""Outlines of cubics that are exactly ellipses, or upright rectangles with sharp or rounded corners.
+
+All of them are boxes with corners of some radii: 0 for sharp ones, half the sides for an ellipse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.scene.geometry import ARC_HANDLE
+from warpsplat.svg.commands import Pair, minus, row
+from warpsplat.svg.numbers import number
+
+Floats = npt.NDArray[np.float64]
+
+NEAR = 0.01
+"""Largest distance of an exact outline's points from their places, in units of the view box: single precision
+is as coarse. Those of other outlines lie on whole numbers, where the handles of arcs hardly ever do."""
+
+POINT_COUNTS = (12, 18, 24)
+"""Of four arcs or lines, of four arcs and two lines, and of four of each."""
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """An ellipse or rectangle."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    radii: tuple[float, float]
+    """Of the corners."""
+    is_clockwise: bool = True
+    """Whether it runs from x towards y, which is clockwise on a screen."""
+
+    @property
+    def is_round(self) -> tuple[bool, bool]:
+        """Return whether the corners take up all of its width, and of its height."""
+        x, y = (
+            r > 0 and b - a - 2 * r < NEAR for a, b, r in zip(self.low, self.high, self.radii, strict=True)
+        )
+        return x, y
+
+    def rounded(self) -> Primitive | None:
+        """Return it in whole numbers; None if nothing would be left."""
+        ends = []
+        for a, b, r, is_round in zip(self.low, self.high, self.radii, self.is_round, strict=True):
+            middle, radius = round((a + b) / 2), round(r)
+            ends.append((middle - radius, middle + radius) if is_round else (round(a), round(b)))
+            if radius < (r > 0) or ends[-1][1] - ends[-1][0] < max(1, 2 * radius):
+                return None
+        radii = round(self.radii[0]), round(self.radii[1])
+        return Primitive((ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]), radii, self.is_clockwise)
+
+    def cubics(self) -> Floats:
+        """Return its arcs and sides, the first one an arc at the upper left, shape (piece, 4, 2)."""
+        (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+        nodes = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
+        nodes += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
+        places = np.array([*nodes, nodes[0]])
+        found = []
+        for i, corner in enumerate(corners):
+            a, b, c = places[2 * i : 2 * i + 3]
+            if rx > 0:
+                found.append([a, a + ARC_HANDLE * (corner - a), b + ARC_HANDLE * (corner - b), b])
+            if not self.is_round[i % 2]:
+                found.append([b, (2 * b + c) / 3, (b + 2 * c) / 3, c])
+        cubics = np.array(found)
+        return cubics if self.is_clockwise else cubics[::-1, ::-1]
+
+    def element(self) -> str:
+        """Return the element without brackets and style, such as ``circle cx="9" cy="9" r="5"``."""
+        (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
+        if all(self.is_round):
+            tag, values = "ellipse", {"cx": (x0 + x1) / 2, "cy": (y0 + y1) / 2, "rx": rx, "ry": ry}
+            if rx == ry:
+                tag, values = "circle", {"cx": values["cx"], "cy": values["cy"], "r": rx}
+        else:
+            tag, values = "rect", {"x": x0, "y": y0, "width": x1 - x0, "height": y1 - y0}
+            values |= {"rx": rx} if rx > 0 else {}
+            values |= {"ry": ry} if ry != rx else {}
+        return " ".join([tag, *(f'{name}="{number(value, 1)}"' for name, value in values.items())])
+
+    def data(self, pen: Pair | None) -> tuple[str, Pair]:
+        """Return path data in whole numbers, and where the pen is then.
+
+        ``pen``: where it is before, if any.
+        """
+        rx, ry = (round(r) for r in self.radii)
+        nodes = [(round(x), round(y)) for x, y in self.cubics()[:, 0].tolist()]
+        start = nodes[0]
+        steps = [minus(b, a) for a, b in zip(nodes, [*nodes[1:], start], strict=True)]
+        if all(self.is_round):
+            steps = [(steps[i][0] + steps[i + 1][0], steps[i][1] + steps[i + 1][1]) for i in (0, 2)]
+        large, sweep = int(len(steps) == 2), int(self.is_clockwise)
+        text, last = f"M{row(start, False)}", "M"
+        if pen is not None:
+            text = min(text, f"m{row(minus(start, pen), False)}", key=len)
+        for x, y in steps:
+            letter, numbers = "a", [rx, ry, 0, large, sweep, x, y]
+            if not large and 0 in (x, y):
+                letter, numbers = ("v", [y]) if x == 0 else ("h", [x])
+            text += row(numbers, True) if letter == last else letter + row(numbers, False)
+            last = letter
+        return text, start
+
+
+def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
+    """Yield the contours of fills that are ellipses or rectangles.
+
+    ``exact``: the scene's points in units of the view box, shape (point, 2).
+    """
+    for group in scene.alike():
+        count = group.points.shape[1]
+        if group.kind != Kind.FILL or group.basis != Basis.CUBIC or count not in POINT_COUNTS:
+            continue
+        points = exact[scene.starts[group.contours][:, None] + np.arange(count)]
+        low, high = points.min(axis=1), points.max(axis=1)
+        pieces = points.reshape(len(points), -1, 3, 2)
+        steps = np.roll(pieces[:, :, 0], -1, axis=1) - pieces[:, :, 0]
+        is_arc = (np.abs(steps) > NEAR).all(axis=2)
+        arcs = is_arc.sum(axis=1)
+        radii = np.where(is_arc[..., None], np.abs(steps), 0).max(axis=1)
+        likely = (arcs == 4) | ((arcs == 0) & (count == POINT_COUNTS[0]))
+        likely &= (high - low > NEAR).all(axis=1) & (2 * radii <= high - low + NEAR).all(axis=1)
+        x, y = points[..., 0], points[..., 1]
+        turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
+        for i in np.flatnonzero(likely).tolist():
+            (x0, y0), (x1, y1), (rx, ry) = (values[i].tolist() for values in (low, high, radii))
+            made = Primitive((x0, y0), (x1, y1), (rx, ry), bool(turning[i]))
+            if _turned(made, points[i]) is not None:
+                yield int(group.contours[i]), made
+
+
+def _turned(made: Primitive, points: Floats) -> int | None:
+    """Return by how many points an outline's start is behind that of ``made``; None: they differ."""
+    ring = made.cubics()[:, :3].reshape(-1, 2)
+    if ring.shape != points.shape:
+        return None
+    start = int(np.abs(ring - points[0]).sum(axis=1).argmin())
+    return start if np.abs(np.roll(ring, -start, axis=0) - points).max() <= NEAR else None
+
+
+def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[slice, Floats]]:
+    """Yield the rows and the points, in whole numbers but for handles, of ellipses and rounded rectangles.
+
+    Arguments are those of ``primitives``.
+    """
+    for contour, made in primitives(scene, exact):
+        held = made.rounded() if made.radii[0] > 0 else None
+        if held is None:
+            continue
+        rows = slice(*scene.starts[contour : contour + 2].tolist())
+        start = _turned(made, exact[rows])
+        ring = held.cubics()[:, :3].reshape(-1, 2)
+        if start is not None and ring.shape == exact[rows].shape:
+            yield rows, np.roll(ring, -start, axis=0)
+
+
+def held_rounds(scene: Scene, per_pixel: float) -> npt.NDArray[np.bool_]:
+    """Return which points belong to ellipses and rounded rectangles, shape (point,)."""
+    found = np.zeros(len(scene.points), np.bool_)
+    for rows, _ in held_primitives(scene, scene.points.astype(np.float64) * per_pixel):
+        found[rows] = True
+    return found
