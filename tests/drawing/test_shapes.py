@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.drawing.drawings import BLUE, GOLD, RED, ROUND, WHITE, Outline, disc, drawing, polygon, rounded
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.shapes import merge_near
 from warpsplat.drawing.tidy import finish_drawing
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

@@ -6,11 +6,11 @@ from dataclasses import replace
 from functools import partial
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import as_fit, draw_pixels, enlargement, limited, original
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -70,7 +70,7 @@ def trace_regions(problem: Problem, most: int | None) -> Drawing:
     """
     settings = problem.settings
     traced = trace(original(problem.target), most=most)
-    drawing = Drawing(traced.scene, traced.joints, traced.same)
+    drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
         drawing = replace(drawing, scene=limited(drawing.scene, settings))

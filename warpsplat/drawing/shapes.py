@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
+from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing
 from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
 from warpsplat.drawing.trace.curves import Pieces
-from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
-from warpsplat.kernels.constants import NONE
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import starts_of
@@ -250,7 +249,7 @@ def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     after = starts_of(counts)
     first = after[np.searchsorted(scene.starts, scene.first)]
     changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
-    return Drawing(changed, np.concatenate(joints), np.full(len(changed.points), NONE, np.int32))
+    return Drawing(changed, np.concatenate(joints))
 
 
 def _is_line(cubics: Floats) -> npt.NDArray[np.bool_]:

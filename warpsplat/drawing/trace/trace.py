@@ -36,8 +36,6 @@ class Traced:
     scene: Scene
     joints: npt.NDArray[np.int32]
     """``Joint`` of each control point, shape (point,)."""
-    same: npt.NDArray[np.int32]
-    """-1 for each point: none is shared by several shapes. Shape (point,)."""
 
 
 def trace(image: FloatArray, *, most: int | None = None) -> Traced:
@@ -151,7 +149,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
         opacities=np.where(has_ramp | (colors[:, 3] >= OPAQUE), 1, colors[:, 3] / 255).astype(np.float32),
         **_paints(shapes),
     )
-    return Traced(scene, joints.astype(np.int32), np.full(len(joints), -1, np.int32))
+    return Traced(scene, joints.astype(np.int32))
 
 
 def _paints(shapes: list[Fill]) -> dict[str, Any]:
