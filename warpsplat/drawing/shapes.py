@@ -244,7 +244,7 @@ def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     for one in chosen:
         cubics = one.made.cubics()
         points[one.contour] = cubics[:, :3].reshape(-1, 2).astype(np.float32)
-        joints[one.contour] = joints_of(Pieces(cubics, _is_line(cubics))).astype(np.int32)
+        joints[one.contour] = joints_of([Pieces(cubics, _is_line(cubics))]).astype(np.int32)
     counts = np.array([len(own) for own in points], np.int32)
     after = starts_of(counts)
     first = after[np.searchsorted(scene.starts, scene.first)]
