@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.fit.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
@@ -72,7 +72,7 @@ def rounded(x: float, y: float, half: float, radius: float, angle: float = 0.0) 
 def drawing(
     canvas: Canvas, *shapes: tuple[tuple[float, float, float], list[Outline]], spread: float = 0.0
 ) -> Drawing:
-    """Shapes of a colour and contours; points at one place in several shapes are the same.
+    """Shapes of a colour and contours.
 
     ``spread``: standard deviation by which each place is off [px], neighbours by themselves.
     """
@@ -82,13 +82,10 @@ def drawing(
     places: dict[tuple[float, float], list[int]] = defaultdict(list)
     for i, (x, y) in enumerate(np.round(points, 6).tolist()):
         places[x, y].append(i)
-    same = np.full(len(points), -1, np.int32)
     rng = np.random.default_rng(0)
     moved = points.copy()
-    for number, members in enumerate(places.values()):
+    for members in places.values():
         moved[members] += rng.normal(0, spread, 2) if spread else 0
-        if len(set(owner[members])) > 1:
-            same[members] = number
     scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
@@ -99,7 +96,7 @@ def drawing(
         colors=np.array([color for color, _ in shapes], np.float32),
         opacities=np.ones(len(shapes), np.float32),
     )
-    return Drawing(scene, np.array([j for _, joints in outlines for j in joints], np.int32), same)
+    return Drawing(scene, np.array([j for _, joints in outlines for j in joints], np.int32))
 
 
 WHITE = np.ones(3, np.float32)

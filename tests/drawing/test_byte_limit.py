@@ -10,8 +10,8 @@ import pytest
 
 from tests.runs import scored, vectorize
 from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.problem import Fit
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
@@ -69,7 +69,7 @@ def sketch(regions: int, size: int, psnr: float) -> Sketch:
     """A drawing of so many regions, as far as its size is concerned."""
     scene = trace(squares()).scene.take(np.arange(regions))
     nothing = np.zeros(len(scene.points), np.int32)
-    return Sketch(Fit(scene, 1.0, psnr, psnr, 0, False), size, Drawing(scene, nothing, nothing - 1))
+    return Sketch(Fit(scene, 1.0, psnr, psnr, 0, False), size, Drawing(scene, nothing))
 
 
 def test_what_shows_more_is_taken() -> None:

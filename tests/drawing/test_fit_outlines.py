@@ -10,17 +10,19 @@ import pytest
 from tests.drawing.drawings import BLUE, RED, WHITE, disc, drawing, logo, seam
 from tests.scenes import with_gradients
 from warpsplat.alpha import squares
-from warpsplat.drawing.fit_outlines import Refinement, own_colors, refine_drawing, start
-from warpsplat.fit.constraints import Constraints, Drawing
+from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.fit_outlines import OutlineFit
+from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.fit.problem import Run
-from warpsplat.fit.step import Step
+from warpsplat.fit.schedule import Phase
+from warpsplat.fit.settings import Density, make_settings
+from warpsplat.fit.state import FitState
+from warpsplat.fit.step import Step, Target
 from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray, Scene
 from warpsplat.scene.attributes import Joint
-
-QUICK = Refinement(steps=60, point_rate=0.4)
 
 
 def psnr(scene: Scene, target: FloatArray, backend: Backend) -> float:
@@ -31,7 +33,7 @@ def psnr(scene: Scene, target: FloatArray, backend: Backend) -> float:
 def assert_clean(made: Drawing, scene: Scene) -> None:
     """Lines, smooth joints, ties and borders of ``made`` hold in ``scene``."""
     points = scene.points.astype(float)
-    on, following = made.links()
+    on, following = np.arange(0, len(points), 3), 3 * made.following()
     lines = made.lines()
     a, b = points[on[lines]], points[following[lines]]
     np.testing.assert_allclose(points[on[lines] + 1], (2 * a + b) / 3, atol=1e-5)
@@ -42,14 +44,19 @@ def assert_clean(made: Drawing, scene: Scene) -> None:
         turn = back[0] * ahead[1] - back[1] * ahead[0]
         assert abs(turn) < 1e-4 * (1 + float(np.linalg.norm(back) * np.linalg.norm(ahead))), p
         assert back @ ahead > 0
-    for number in np.unique(made.same[made.same >= 0]):
-        assert len(np.unique(scene.points[made.same == number], axis=0)) == 1
-    constraints = Constraints.of(made)
+    of_lines = (np.repeat(lines, 3).reshape(-1, 3) & [False, True, True]).ravel()
     size = np.array([scene.canvas.width, scene.canvas.height])
     for axis in (0, 1):
         for edge in (0, size[axis]):
             here = made.scene.points[:, axis] == edge
-            assert (scene.points[here & ~constraints.line_handles, axis] == edge).all()
+            assert (scene.points[here & ~of_lines, axis] == edge).all()
+
+
+def fitted(target: FloatArray, made: Drawing, backend: Backend, steps: int = 20) -> Scene:
+    run = Run(backend)
+    fit = OutlineFit(target, made, run)
+    fit.advance(run, steps)
+    return fit.drawing.scene
 
 
 @pytest.mark.parametrize("background", [WHITE, None], ids=["opaque", "transparent"])
@@ -58,7 +65,7 @@ def test_a_logo_is_found_again(device: str, background: FloatArray | None) -> No
     exact = logo(background)
     target = render(exact.scene, backend=backend)
     off = logo(background, spread=0.5)
-    scene = refine_drawing(target, off, Run(backend), QUICK).scene
+    scene = fitted(target, off, backend)
     assert psnr(off.scene, target, backend) < 27
     assert psnr(scene, target, backend) > 45
     assert_clean(off, scene)
@@ -70,7 +77,7 @@ def test_seams_stay_closed(device: str) -> None:
     backend = Backend.on(device)
     target = render(seam().scene, backend=backend)
     off = seam(spread=0.5)
-    scene = refine_drawing(target, off, Run(backend), QUICK).scene
+    scene = fitted(target, off, backend)
     assert psnr(scene, target, backend) > psnr(off.scene, target, backend) + 10
     assert_clean(off, scene)
 
@@ -80,39 +87,16 @@ def test_what_is_exact_stays(device: str) -> None:
     backend = Backend.on(device)
     exact = logo()
     target = render(exact.scene, backend=backend)
-    scene = refine_drawing(target, exact, Run(backend), Refinement(steps=10, point_rate=3)).scene
+    scene = fitted(target, exact, backend)
     assert psnr(scene, target, backend) > 70
-
-
-def test_colours_are_the_pictures_own(device: str) -> None:
-    backend = Backend.on(device)
-    exact = logo()
-    levels = np.round(render(exact.scene, backend=backend) * 255) / 255
-    colors = np.clip(exact.scene.colors + np.random.default_rng(3).normal(0, 0.02, (4, 3)), 0, 1).astype(
-        np.float32
-    )
-    off = replace(exact, scene=replace(exact.scene, colors=colors))
-    target = levels.astype(np.float32)
-    fitted = refine_drawing(target, off, Run(backend), replace(QUICK, colors="fitted")).scene
-    np.testing.assert_allclose(fitted.colors, exact.scene.colors, atol=0.5 / 255)
-    held = refine_drawing(target, off, Run(backend), QUICK).scene
-    np.testing.assert_array_equal(held.colors, colors)
-
-
-def test_of_a_noisy_picture_the_mean_is_taken() -> None:
-    made = logo()
-    rng = np.random.default_rng(4)
-    target = np.clip(np.full((32, 32, 3), 0.5) + rng.normal(0, 0.01, (32, 32, 3)), 0, 1).astype(np.float32)
-    scene = replace(made.scene, colors=np.full((4, 3), 0.5, np.float32))
-    np.testing.assert_allclose(own_colors(scene, target), 128 / 255, atol=1e-6)
 
 
 def test_a_picture_without_shapes(device: str) -> None:
     made = logo()
     none = made.scene.take(np.zeros(0, np.intp))
-    empty = Drawing(none, np.zeros(0, np.int32), np.zeros(0, np.int32))
-    found = refine_drawing(np.ones((64, 64, 3), np.float32), empty, Run(Backend.on(device)))
-    assert len(found.scene) == 0
+    empty = Drawing(none, np.zeros(0, np.int32))
+    found = finish_drawing(np.ones((64, 64, 3), np.float32), empty, Run(Backend.on(device)))
+    assert len(found.drawing.scene) == 0
 
 
 def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
@@ -122,20 +106,21 @@ def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
     scene = replace(exact.scene, canvas=replace(exact.scene.canvas, background=None))
     target = render(exact.scene, backend=backend)
     off = replace(scene, points=seam(spread=0.3).scene.points)
-    found = refine_drawing(target, replace(exact, scene=off), Run(backend), QUICK).scene
+    found = fitted(target, replace(exact, scene=off), backend)
     whole = np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3
 
 
-def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> None:
+def test_gradients_stay_while_outlines_are_fitted(device: str) -> None:
     backend = Backend.on(device)
     exact = logo()
     ramps = with_gradients(exact.scene)
     target = render(ramps, backend=backend)
-    off = replace(ramps, frames=ramps.frames + np.float32(0.7) * (ramps.frames != 0))
-    fitted = refine_drawing(target, replace(exact, scene=off), Run(backend), QUICK).scene
-    assert psnr(fitted, target, backend) > psnr(replace(off, opacities=fitted.opacities), target, backend)
-    np.testing.assert_array_equal(fitted.stop_opacities, ramps.stop_opacities)
+    off = replace(ramps, points=logo(spread=0.3).scene.points)
+    found = fitted(target, replace(exact, scene=off), backend)
+    assert psnr(found, target, backend) > psnr(off, target, backend) + 10
+    np.testing.assert_array_equal(found.frames, ramps.frames)
+    np.testing.assert_array_equal(found.stop_opacities, ramps.stop_opacities)
 
 
 @pytest.mark.parametrize("background", [WHITE, None])
@@ -147,9 +132,13 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
     target = render(replace(made.scene, points=made.scene.points + np.array([7, 3], np.float32)))
     points, errors, still = [], [], []
     for keeps in (False, True):
-        step = start(target, made, Backend.on(device, 1), Refinement(point_rate=0.9))
-        step.state.parameters.keeps_colors = keeps
-        step = Step(step.state, step.settings, step.target)
+        state = FitState.start(made.scene, Backend.on(device, 1), np.random.default_rng(0))
+        state.parameters.keeps_colors = keeps
+        for name in ("colors", "opacities"):
+            state.parameters.hold(name, np.ones(len(made.scene), np.bool_))
+        settings = make_settings(texture=0.0, bending=0.0, rates={"points": 0.9, "colors": 0.0})
+        settings = replace(settings, coarse=0.0, density=Density(interval=0))
+        step = Step(state, settings, Target(target, Phase(96, 80, slack=1.0)))
         figures, states = [], []
         for _ in range(12):
             step.advance()

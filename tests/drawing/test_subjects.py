@@ -39,7 +39,7 @@ def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> N
     assert {'width="300"', 'height="300"'} <= set(large.svg.partition(">")[0].split())
     assert (large.scene.canvas.width, large.scene.canvas.height) == (300, 300)
     plain = vectorize(small, settings, Backend.on(device))
-    assert score_svg(large.svg, small, perceptual=False).psnr > scored(plain).psnr - 0.5
+    assert score_svg(large.svg, small, perceptual=False).psnr >= scored(plain).psnr - 0.5
     assert large.scene.points.shape == plain.scene.points.shape
 
 

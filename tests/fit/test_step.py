@@ -12,7 +12,6 @@ from tests.drawing.drawings import seam
 from tests.fit.pictures import picture, step_for
 from tests.kernels.modules import all_kernels
 from tests.scenes import mixed_scene, picture_scene, with_gradients
-from warpsplat.drawing.fit_outlines import Refinement, start
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
@@ -20,7 +19,6 @@ from warpsplat.fit.rounding import evaluate_file
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.fit.step import Step
 from warpsplat.metrics import psnr
-from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Paint, Picture, Scene
@@ -74,7 +72,7 @@ def steps_of_all_kinds(device: str) -> Iterator[Step]:
     kept = Picture("<g/>", (64, 48), (9, 9), np.full((20, 20, 4), 0.5, np.float32))
     target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)
     yield step_for(scene.append(picture_scene(scene.canvas, kept)), target, device, threads=1)
-    yield start(np.ones((32, 48, 3), np.float32), seam(), Backend.on(device, 1), Refinement())
+    yield step_for(seam().scene, np.ones((32, 48, 3), np.float32), device, threads=1)
     circle = np.array([30, 20, 9, 0, 0, 9], np.float32)
     radial = (painted.paint == Paint.RADIAL)[:, None]
     layers = np.minimum(np.arange(len(painted)), 1).astype(np.int32)

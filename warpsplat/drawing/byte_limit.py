@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from warpsplat.fit.problem import Fit
 
 if TYPE_CHECKING:
-    from warpsplat.fit.constraints import Drawing
+    from warpsplat.drawing.constraints import Drawing
 
 
 @dataclass(frozen=True, eq=False)

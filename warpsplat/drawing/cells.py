@@ -6,7 +6,7 @@ A set of them is an array of ascending integers.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,21 +53,6 @@ def cells_around(cubics: Floats) -> list[Cells]:
     passed = np.unique(which * every + places[:, 0] * ROW_SPAN + places[:, 1])
     near = np.unique(passed[:, None] + CELL_OFFSETS)
     return np.split(near % every, np.searchsorted(near, np.arange(1, len(cubics)) * every))
-
-
-def first_apart(sets: Iterable[Cells]) -> list[int]:
-    """Choose sets in their order that have no cell in common with one chosen before; return their indices."""
-    known = list(sets)
-    if not known:
-        return []
-    unique, number = np.unique(np.concatenate(known), return_inverse=True)
-    taken = np.zeros(len(unique), np.bool_)
-    chosen = []
-    for i, own in enumerate(np.split(number, np.cumsum([len(cells) for cells in known])[:-1])):
-        if not taken[own].any():
-            chosen.append(i)
-            taken[own] = True
-    return chosen
 
 
 def by_cell(tiles: npt.NDArray[np.floating[Any]], viewport: Viewport) -> Floats:

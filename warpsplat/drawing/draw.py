@@ -6,11 +6,11 @@ from dataclasses import replace
 from functools import partial
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import as_fit, draw_pixels, enlargement, limited, original
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -24,7 +24,9 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
     parts = run.open_parts(share=0.5 if limit else 1.0)
-    finish = partial(finish_drawing, original(problem.target), finest=finest(settings))
+    finish = partial(
+        finish_drawing, original(problem.target), finest=finest(settings), symbols=settings.symbols
+    )
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
         sketch = _sketch(problem, run, done)
@@ -70,7 +72,7 @@ def trace_regions(problem: Problem, most: int | None) -> Drawing:
     """
     settings = problem.settings
     traced = trace(original(problem.target), most=most)
-    drawing = Drawing(traced.scene, traced.joints, traced.same)
+    drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
         drawing = replace(drawing, scene=limited(drawing.scene, settings))

@@ -3,129 +3,172 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.fit.constraints import Constraints, Drawing, Projection
-from warpsplat.fit.densification import recover
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats
+from warpsplat.drawing.measure import Measure, Samples, is_shaded
+from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
-from warpsplat.fit.progress import Progress
-from warpsplat.fit.schedule import CHECK_INTERVAL, Phase
-from warpsplat.fit.settings import Density, Settings, make_settings
-from warpsplat.fit.state import FitState
-from warpsplat.fit.step import Step, Target
-from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.renderer import Capacity
-from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.fit.progress import Progress, Snapshot
+from warpsplat.metrics import decibels
+from warpsplat.rendering.renderer import Capacity, render
+from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 
-Colors = Literal["held", "fitted"]
-
-OUTLINE_STEPS = 200
+STEPS = 12
 """Most steps of a refinement."""
 
-OUTLINE_RATE = 0.25
-"""Learning rate of points at the start [px]: outlines are traced to about a pixel."""
+LEAST_GAIN, MOST_IDLE = 0.005, 3
+"""A refinement ends when so many steps in a row have not lowered the least error by this share."""
 
-FINAL_RATE = 0.02
-"""Learning rates at the end over those at the start: what is left to gain is hundredths of a pixel."""
+DAMPING, LEAST_DAMPING, CALMER = 0.03, 0.01, 0.3
+"""Added curvature, as a share, at first and at the least, and its factor where a step lowered the error."""
 
-COLOR_RATE = 0.004
-"""Learning rate of colours: one of 256 levels."""
+RAISED, WILDER, MOST_DAMPING = 3.0, 8.0, 100.0
+"""Where it did not: the least, the factor and the most."""
 
-LEAST_GAIN, GAIN_STEPS = 0.005, 40
-"""A refinement ends when the error has not fallen by this share in so many steps."""
+MOST_STEP = 0.7
+"""How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
+FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
+"""First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
 
-SNAP_DISTANCE = 6 / 255
-"""Largest difference in each channel between a fitted colour and the image's colour that it is snapped to."""
-
-SNAP_SHARE = 0.5
-"""Least share of that colour among the image's colours nearby: in a noisy image no colour has it."""
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """Options of a refinement."""
-
-    steps: int = OUTLINE_STEPS
-    point_rate: float = OUTLINE_RATE
-    """[px] at the start."""
-    colors: Colors = "held"
-    """Whether colours stay, or are fitted and then snapped to those of the image."""
-
-    def settings(self, scene: Scene) -> Settings:
-        """Return the settings: the shapes stay, and the loss is the squared error alone."""
-        plain = make_settings(
-            curves=max(1, min(len(scene), 100_000)),
-            iterations=self.steps,
-            texture=0.0,
-            bending=0.0,
-            final_rate=FINAL_RATE,
-            rates={"points": self.point_rate, "colors": COLOR_RATE},
-        )
-        return replace(plain, coarse=0.0, density=Density(interval=0))
+LOOKS = 8
+"""Steps from one measurement of the contrasts to the next."""
 
 
-def refine_drawing(
-    target: FloatArray,
-    drawing: Drawing,
-    run: Run,
-    how: Refinement | None = None,
-    *,
-    held: npt.NDArray[np.bool_] | None = None,
-    capacity: Capacity | None = None,
-) -> Drawing:
-    """Fit the outlines of a drawing jointly, by exact coverage at full size; shapes and their opacities stay.
+class Paints:
+    """Fits the places of gradients by the signs of derivatives (Rprop, Riedmiller and Braun 1993)."""
 
-    Args:
-        target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height, width,
-            4), of a scene on a transparent canvas.
-        drawing: fills of cubics.
-        run: how the work is carried out; when it is over, the best so far is taken.
-        how: rates and steps.
-        held: points that stay where they are, shape (point,).
-        capacity: of the renderer to begin with, if it is known.
+    def __init__(self, scene: Scene) -> None:
+        self.best = scene.frames.astype(np.float64)
+        self._frames, self._last = self.best.copy(), np.zeros_like(self.best)
+        self._step = np.full_like(self.best, FRAME_STEP)
+        along, across = self.best[:, 2:4], self.best[:, 4:]
+        self._round = (scene.paint == Paint.RADIAL) & (across == turned(along)).all(axis=1)
 
-    Returns:
-        the drawing with the least error of those evaluated, the start among them.
+    def moved(self, gradient: Floats) -> Floats:
+        """Return the frames after a step."""
+        gradient = gradient.copy()
+        # Of a circle the second axis follows the first.
+        gradient[self._round, 2:4] -= turned(gradient[self._round, 4:])
+        gradient[self._round, 4:] = 0
+        agrees = gradient * self._last
+        self._step *= np.where(agrees > 0, FASTER, np.where(agrees < 0, SLOWER, 1.0))
+        self._last = gradient
+        self._frames = self._frames - np.sign(gradient) * self._step
+        self._frames[self._round, 4:] = turned(self._frames[self._round, 2:4])
+        return self._frames
 
-    Raises:
-        ValueError: joints do not fit the scene, or its shapes are not fills of cubics.
+    def keep(self) -> None:
+        """Note the frames of the last step as the best."""
+        self.best = self._frames
+
+
+def turned(vectors: Floats) -> Floats:
+    """Return vectors turned by a right angle, shape (vector, 2)."""
+    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
+
+
+class OutlineFit:
+    """Fits the outlines of a drawing jointly, by exact coverage at full size; all but their points stays.
+
+    By steps of Gauss and Newton with damping (Levenberg 1944, Marquardt 1963) that follows, for each cubic,
+    whether the error around it falls.
     """
-    how = how or Refinement()
-    if not len(drawing.scene):
-        return drawing
-    target = matching(target, drawing.scene.canvas)
-    step = start(target, drawing, run.backend, how, held, capacity)
-    best, least = _evaluate(step)
-    gained = 0
-    """Steps at the last gain that counts."""
-    for done in range(1, how.steps + 1):
-        step.advance()
-        if done % CHECK_INTERVAL == 0 or done == how.steps:
-            recover(step, replaces=False)
-            found, error = _evaluate(step)
-            if error < (1 - LEAST_GAIN) * least:
-                gained = done
-            if error < least:
-                best, least = found, error
+
+    def __init__(
+        self, target: FloatArray, drawing: Drawing, run: Run, capacity: Capacity | None = None
+    ) -> None:
+        """Project the points onto the constraints.
+
+        Args:
+            target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
+                width, 4), of a scene on a transparent canvas.
+            drawing: fills of cubics, one at least.
+            run: the device.
+            capacity: of the renderer to begin with, if it is known.
+
+        Raises:
+            ValueError: joints do not fit the scene, or its shapes are not fills of cubics.
+        """
+        self._drawing, self._following = drawing, drawing.following()
+        self._constraints = Constraints(drawing)
+        self.points = self._constraints.project(drawing.scene.points.astype(np.float64))
+        target = matching(target, drawing.scene.canvas)
+        self._measure = Measure(target, drawing, self.points, run.backend, capacity)
+        self.error, self._around = self._measure.error(self.points)
+        self._measure.look()
+        self._paints = Paints(drawing.scene) if is_shaded(drawing.scene).any() else None
+
+    @property
+    def drawing(self) -> Drawing:
+        """The drawing with the least error of those evaluated, the start among them."""
+        return replace(self._drawing, scene=self._scene())
+
+    def _scene(self) -> Scene:
+        scene = replace(self._drawing.scene, points=self.points.astype(np.float32))
+        return replace(scene, frames=self._paints.best.astype(np.float32)) if self._paints else scene
+
+    @property
+    def capacity(self) -> Capacity:
+        """Capacity of the renderer's arrays."""
+        return self._measure.capacity
+
+    @property
+    def least(self) -> float:
+        """Curvature that does not count."""
+        return self._measure.least
+
+    def places(self) -> Samples:
+        """Return where the image has the outlines."""
+        self._measure.error(self.points)
+        return self._measure.places(self.points)
+
+    def hold(self, points: Floats, held: Flags) -> None:
+        """Begin again at ``points``; those that are ``held``, shape (point,), stay there from now on."""
+        drawing = replace(self._drawing, scene=replace(self._drawing.scene, points=points.astype(np.float32)))
+        self._constraints = Constraints(drawing, held)
+        self.points = self._constraints.project(points)
+        self.error, self._around = self._measure.error(self.points)
+
+    def advance(self, run: Run, steps: int = STEPS) -> None:
+        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over."""
+        at, around, idle = self.points, self._around, 0
+        damping = np.full(len(self._following), DAMPING)
+        for done in range(1, steps + 1):
+            gradient = self._measure.gradient()
+            if self._paints:
+                self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
+            if done % LOOKS == 0:
+                self._measure.look()
+            freedom = self._constraints.freedom(at)
+            bending = Bending(self._measure.samples(at), self._following)
+            change = newton_step(bending, freedom, gradient, damping, self._measure.least)
+            change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
+            at = self._constraints.project(at + change.reshape(-1, 2))
+            error, now = self._measure.error(at)
+            worse = np.clip(WILDER * damping, RAISED, MOST_DAMPING)
+            damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), worse)
+            around = now
+            idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
+            if error < self.error:
+                self.points, self.error, self._around = at, error, now
+                if self._paints:
+                    self._paints.keep()
             if run.on_progress:
-                run.report(_progress(step, done, how.steps, time.monotonic() - run.started))
-        if done - gained >= GAIN_STEPS or run.over():
-            break
-    if how.colors == "fitted":
-        snapped = replace(best, colors=own_colors(best, target))
-        step.state.parameters.assign(snapped)
-        best = _evaluate(step)[0]
-    return replace(drawing, scene=best)
+                run.report(self._progress(done, steps, time.monotonic() - run.started))
+            if idle >= MOST_IDLE or run.over():
+                break
+        if self._paints:
+            self._measure.paint(self._paints.best)
 
-
-def _progress(step: Step, done: int, steps: int, seconds: float) -> Progress:
-    shapes, snapshot = step.state.shape_count, step.snapshot()
-    return Progress(done, steps, step.psnr(), seconds, done / steps, True, shapes, snapshot)
+    def _progress(self, done: int, steps: int, seconds: float) -> Progress:
+        scene = self._scene()
+        snapshot = Snapshot(lambda: scene, lambda: render(scene))
+        figure = decibels(self.error * 255**2)
+        return Progress(done, steps, figure, seconds, done / steps, True, len(scene), snapshot)
 
 
 def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
@@ -133,59 +176,3 @@ def matching(target: FloatArray, canvas: Canvas) -> FloatArray:
     if canvas.background is None and target.shape[2] == 3:
         return np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     return target
-
-
-def start(
-    target: FloatArray,
-    drawing: Drawing,
-    backend: Backend,
-    how: Refinement,
-    held: npt.NDArray[np.bool_] | None = None,
-    capacity: Capacity | None = None,
-) -> Step:
-    """Return a step for ``drawing``, its points projected onto the constraints; ``held`` ones stay there.
-
-    ``capacity``: of the renderer to begin with; the first evaluation enlarges it if need be.
-    """
-    state = FitState.start(drawing.scene, backend, np.random.default_rng(0))
-    projection = Projection(Constraints.of(drawing), state.parameters, held)
-    projection.project()
-    state.projection = projection
-    every = np.ones(len(drawing.scene), np.bool_)
-    state.parameters.hold("opacities", every)
-    state.parameters.hold("stop_opacities", np.ones(len(drawing.scene.stop_opacities), np.bool_))
-    if how.colors == "held":
-        state.parameters.hold("colors", every)
-        state.parameters.keeps_colors = True
-    height, width = target.shape[:2]
-    goal = Target(target, Phase(width, height, slack=1.0))
-    return Step(state, how.settings(drawing.scene), goal, capacity=capacity)
-
-
-def _evaluate(step: Step) -> tuple[Scene, float]:
-    """Return the scene and its mean squared error."""
-    step.render()
-    return step.state.scene(), step.measured_error()
-
-
-def own_colors(scene: Scene, target: FloatArray) -> FloatArray:
-    """Return the colours of the shapes, snapped to the image's 8-bit colours, shape (shape, 3).
-
-    A colour is snapped to the most frequent one near it, unless many others lie near as well: then the fitted
-    mean is better.
-    """
-    pixels = target.reshape(-1, target.shape[2])
-    if target.shape[2] == 4:
-        pixels = pixels[pixels[:, 3] > 1 - 0.5 / 255][:, :3]
-    levels, counts = np.unique(np.round(pixels * 255).astype(np.uint8), axis=0, return_counts=True)
-    palette = levels.astype(np.float32) / np.float32(255)
-    colors = scene.colors.copy()
-    for i, color in enumerate(scene.colors):
-        near = np.flatnonzero((np.abs(palette - color) <= SNAP_DISTANCE).all(axis=1))
-        if len(near):
-            most = near[counts[near].argmax()]
-            if counts[most] >= SNAP_SHARE * counts[near].sum():
-                colors[i] = palette[most]
-                continue
-        colors[i] = np.round(color * 255) / 255
-    return colors

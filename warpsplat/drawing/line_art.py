@@ -8,6 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
 from warpsplat.drawing.strokes.tour import toured
@@ -15,7 +16,6 @@ from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
-from warpsplat.fit.constraints import Drawing
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
@@ -176,7 +176,7 @@ def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -
         ink = np.zeros((*near.shape, 4), np.float32)
         ink[..., 3] = np.where(near, traced.areas.cover, 0)
         found = trace(ink)
-        drawing = Drawing(found.scene, found.joints, found.same)
+        drawing = Drawing(found.scene, found.joints)
         part = run.part(number / len(pens), (number + 1) / len(pens))
         done = finish_drawing(ink, drawing, part, finest=finest, tidy=tidy)
         shapes, count = done.drawing.scene, len(done.drawing.scene)

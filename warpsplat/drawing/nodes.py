@@ -1,322 +1,188 @@
 """Candidates for simpler outlines: fewer, straighter or more upright pieces.
 
-Each is an ``Edit`` of the arrays, with the part of the canvas that it changes and the bytes that it saves.
-How much it costs is measured by rendering (``drawing.tidy``).
+All are found at once, as arrays. How much each costs is told by what the image says of the outlines
+(``drawing.tidy``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.cells import Cells, cells_around, joined
+from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, Flags, Floats, Links, with_ends
 from warpsplat.drawing.merge import handles_through
-from warpsplat.drawing.trace.beziers import points_at
-from warpsplat.fit.constraints import SAME_COORDINATE, Drawing
 from warpsplat.scene.attributes import Joint
 
-Floats = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
-
-MOST_DISTANCE = 0.6  # [canvas units] that a candidate may move an outline, where bytes have their usual price
 LEVEL_SLOPE = 0.06  # slope below which a line, or a tangent, may be made level or upright
 CUBIC_BYTES, LINE_BYTES, HANDLES_BYTES, NUMBER_BYTES = 19, 7, 12, 3
 """Bytes of a cubic, a line, the handles of a cubic and a number in a file."""
 
-Key = tuple[str, int, int]
-CUBICS_AT_ONCE = 512  # candidates that are measured at once, which bounds their memory to some megabytes
-
-
-def key_of(kind: str, at: tuple[float, float]) -> Key:
-    """Return the key of an ``Edit``."""
-    return kind, round(at[0] / 2), round(at[1] / 2)
+WITHOUT, STRAIGHT, LEVEL, TANGENT = range(4)
+"""Kinds: a piece for the two that meet in a point, a line for a cubic, a level or upright line, and such a
+tangent of a smooth joint."""
 
 
 @dataclass(frozen=True)
-class Edit:
-    """A change of a drawing."""
+class Edits:
+    """Changes of a drawing, each of the piece, or of the point, where a cubic begins."""
 
-    kind: str
-    at: tuple[float, float]
-    """Where it is [canvas units]."""
-    cells: Cells
-    """Cells that it may change."""
-    off: float
-    """How far it moves the outline, about [canvas units]."""
-    saved: int
+    kind: npt.NDArray[np.intp]
+    """Shape (edit,), as all."""
+    at: Links
+    """The cubic; ``WITHOUT`` makes it part of the one before."""
+    handles: Floats
+    """Of the piece that it makes, shape (edit, 2, 2); of others nothing."""
+    axis: npt.NDArray[np.intp]
+    """The coordinate that a line or a tangent has in common."""
+    value: Floats
+    """Where a level line lies."""
+    saved: npt.NDArray[np.intp]
     """Bytes."""
-    points: dict[int, Any] = field(default_factory=dict)
-    """Points that move, and where to."""
-    joints: dict[int, Joint] = field(default_factory=dict)
-    removed: tuple[int, ...] = ()
+    around: Links
+    """The cubics that it may change, shape (edit, 4); fewer are repeated."""
 
-    @property
-    def key(self) -> Key:
-        """Its name from round to round, in which the numbers of its points change."""
-        return key_of(self.kind, self.at)
-
-
-def applied(drawing: Drawing, edits: Sequence[Edit]) -> Drawing:
-    """Return the drawing after ``edits`` that have no points in common."""
-    points, joints = drawing.scene.points.copy(), drawing.joints.copy()
-    keep = np.ones(len(points), np.bool_)
-    for edit in edits:
-        for i, place in edit.points.items():
-            points[i] = place
-        for i, joint in edit.joints.items():
-            joints[i] = joint
-        keep[list(edit.removed)] = False
-    scene = replace(drawing.scene, points=points).without_points(keep)
-    return Drawing(scene, joints[keep], drawing.same[keep])
-
-
-def turned(drawing: Drawing) -> Drawing:
-    """Return the same outlines, each begun at another point: the first point is never removed."""
-    starts = drawing.scene.starts
-    order = np.concatenate(
-        [np.roll(np.arange(a, b), -3 * max(1, (b - a) // 6)) for a, b in pairwise(starts.tolist())]
-    )
-    scene = replace(drawing.scene, points=drawing.scene.points[order])
-    return Drawing(scene, drawing.joints[order], drawing.same[order])
+    def take(self, chosen: npt.NDArray[np.integer] | Flags) -> Edits:
+        """Return the ``chosen`` ones."""
+        return Edits(**{name: values[chosen] for name, values in vars(self).items()})
 
 
 class Outlines:
-    """A drawing's outlines by the numbers of their points; the points of several shapes share places."""
+    """A drawing's outlines by the cubics."""
 
-    def __init__(self, drawing: Drawing, reach: float = MOST_DISTANCE) -> None:
-        """``reach``: how far a candidate may move an outline [canvas units]."""
-        self._reach = reach
-        self._size = (drawing.scene.canvas.width, drawing.scene.canvas.height)
-        self._points = drawing.scene.points.astype(np.float64)
-        on, following = drawing.links()
-        self._on = on.tolist()
-        self._next = dict(zip(self._on, following.tolist(), strict=True))
-        self._previous = {b: a for a, b in self._next.items()}
-        self._is_line = dict(zip(self._on, drawing.lines().tolist(), strict=True))
-        self._place = np.where(drawing.same >= 0, drawing.same, -1 - np.arange(len(self._points))).tolist()
-        self._members_at: dict[int, list[int]] = {}
-        for i, place in enumerate(self._place):
-            self._members_at.setdefault(place, []).append(i)
-        starts = drawing.scene.starts
-        self._firsts = set(starts[:-1].tolist())
-        self._sizes = np.repeat(np.diff(starts), np.diff(starts)).tolist()
-        self._is_smooth: list[bool] = (drawing.joints == Joint.SMOOTH).tolist()
+    def __init__(self, drawing: Drawing) -> None:
+        self._drawing = drawing
+        self._next = drawing.following()
+        self._previous = np.empty_like(self._next)
+        self._previous[self._next] = np.arange(len(self._next))
+        self._line = drawing.lines()
+        self._points = drawing.scene.points.astype(np.float64).reshape(-1, 3, 2)
+        self._smooth = drawing.joints[::3] == Joint.SMOOTH
 
-    def edits(self, refused: Set[Key] = frozenset()) -> list[Edit]:
-        """Return all candidates except the ``refused`` ones, whose number grows with each round."""
+    def edits(self, refused: Flags) -> Edits:
+        """Return all candidates but the ``refused`` ones, by cubic and kind, shape (cubic, 4)."""
+        found = [self._merged(), self._straight(), self._level(), self._leaning()]
+        names = vars(found[0])
+        edits = Edits(**{name: np.concatenate([vars(part)[name] for part in found]) for name in names})
+        return edits.take(~refused[edits.at, edits.kind])
 
-        def is_open(kind: str, point: int) -> bool:
-            return key_of(kind, self._at(point)) not in refused
+    def _edits(self, kind: int, at: Links, saved: npt.NDArray[np.intp] | int, **known: Any) -> Edits:
+        before, after = self._previous[at], self._next[at]
+        far = self._previous[before] if kind == WITHOUT else before
+        values: dict[str, Any] = {
+            "handles": np.zeros((len(at), 2, 2)),
+            "axis": np.zeros(len(at), np.intp),
+            "value": np.zeros(len(at)),
+            **known,
+        }
+        around = np.stack([far, before, at, at if kind == TANGENT else after], axis=1)
+        saved = np.broadcast_to(np.asarray(saved, np.intp), at.shape)
+        return Edits(np.full(len(at), kind), at, saved=saved, around=around, **values)
 
-        found: list[Edit | None] = []
-        # Each place once for all shapes.
-        done: set[int] = set()
-        places = []
-        for p in self._on:
-            if self._place[p] not in done:
-                done.add(self._place[p])
-                places.append(p)
-        merged = self._merged([p for p in places if self._is_spare(p) and is_open("without", p)])
-        leaning, sloping = self._leaning(), self._sloping()
-        for p in places:
-            if p in merged:
-                found.append(self._without(p, *merged[p]))
-            if p in leaning and is_open("tangent", p):
-                found.append(self._level_tangent(p, *leaning[p]))
-        firsts = [a for a in self._on if min(self._members(a + 1) + self._members(a + 2)) >= a]
-        thirds = self._thirds([a for a in firsts if not self._is_line[a] and is_open("straight", a + 1)])
-        for a in firsts:
-            if a in sloping and is_open("level", a + 1):
-                found.append(self._level_line(a, *sloping[a]))
-            elif a in thirds:
-                found.append(self._straight(a, *thirds[a]))
-        return [edit for edit in found if edit]
-
-    def _members(self, point: int) -> list[int]:
-        """Return all points at the place of ``point``."""
-        return self._members_at[self._place[point]]
-
-    def _corners(self, a: int) -> Floats:
-        """Return the cubic that begins at ``a``, shape (4, 2)."""
-        return self._points[[a, a + 1, a + 2, self._next[a]]]
-
-    def _at(self, p: int) -> tuple[float, float]:
-        x, y = self._points[p].tolist()
-        return x, y
-
-    @cached_property
-    def _cubic_cells(self) -> dict[int, Cells]:
-        """The cells around the cubic that begins at each point."""
-        on = np.array(self._on)
-        following = [self._next[a] for a in self._on]
-        cubics = self._points[np.stack([on, on + 1, on + 2, following], axis=1)]
-        return dict(zip(self._on, cells_around(cubics), strict=True))
-
-    def _cells(self, *starts: int) -> Cells:
-        """Return the cells around the cubics that begin at ``starts``, and those that change with them."""
-        wide = set(starts)
-        for a in starts:
-            if self._is_smooth[a]:
-                wide.add(self._previous[a])
-            if self._is_smooth[self._next[a]]:
-                wide.add(self._next[a])
-        return joined([self._cubic_cells[a] for a in wide])
-
-    def _is_spare(self, p: int) -> bool:
-        """Return whether the pieces that meet in ``p`` meet nothing else there."""
-        ends = {self._place[self._previous[p]], self._place[self._next[p]]}
-        return len(ends) == 2 and all(
-            m not in self._firsts
-            and self._sizes[m] > 6
-            and {self._place[self._previous[m]], self._place[self._next[m]]} == ends
-            for m in self._members(p)
-        )
-
-    def _merged(self, spare: list[int]) -> dict[int, tuple[Floats, float]]:
-        """Find the points that can go: handles of one piece for the two there, and how far it is off.
-
-        All at once: there are hundreds, and each alone takes a millisecond.
-        """
-        if not spare:
-            return {}
-        first = np.stack([self._corners(self._previous[p]) for p in spare])
-        second = np.stack([self._corners(p) for p in spare])
-        straight = np.array([self._is_line[self._previous[p]] and self._is_line[p] for p in spare])
+    def _merged(self) -> Edits:
+        """Return the points that can go: those of outlines with three pieces or more."""
+        at = np.flatnonzero(self._next[self._next] != self._previous)
+        at = at[self._next[self._next[at]] != at]
+        before = self._previous[at]
+        cubics = with_ends(self._points, self._next)
+        first, second = cubics[before], cubics[at]
         whole = np.stack([first[:, 0], second[:, 3]], axis=1)
-        handles = np.where(straight[:, None, None], thirds_between(whole), handles_through(first, second))
-        off = _apart(np.concatenate([whole[:, :1], handles, whole[:, 1:]], axis=1), first, second)
-        return {spare[i]: (handles[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
+        lines = self._line[before].astype(np.intp) + self._line[at]
+        handles = np.where((lines == 2)[:, None, None], thirds_between(whole), handles_through(first, second))
+        return self._edits(WITHOUT, at, np.where(lines > 0, LINE_BYTES, CUBIC_BYTES), handles=handles)
 
-    def _without(self, p: int, handles: Floats, off: float) -> Edit:
-        """Return the edit that makes one piece of the two that meet in ``p``."""
-        members = self._members(p)
-        a = self._previous[p]
-        lines = self._is_line[a] + self._is_line[p]
-        points, joints, removed = {}, {}, []
-        kind = Joint.LINE_HANDLE if lines == 2 else Joint.FREE
-        for m in members:
-            before = self._previous[m]
-            forward = self._place[before] == self._place[a]
-            points[before + 1], points[m + 2] = handles if forward else handles[::-1]
-            joints[before + 1] = joints[m + 2] = kind
-            removed += [before + 2, m, m + 1]
-        saved = (LINE_BYTES if lines else CUBIC_BYTES) * len(members)
-        return Edit("without", self._at(p), self._cells(a, p), off, saved, points, joints, tuple(removed))
+    def _straight(self) -> Edits:
+        at = np.flatnonzero(~self._line)
+        ends = np.stack([self._points[at, 0], self._points[self._next[at], 0]], axis=1)
+        return self._edits(STRAIGHT, at, HANDLES_BYTES, handles=thirds_between(ends))
 
-    def _thirds(self, starts: Sequence[int]) -> dict[int, tuple[Floats, float]]:
-        """Find the cubics at ``starts`` that are nearly lines: their thirds, and how far the line is off."""
-        if not starts:
-            return {}
-        corners = np.stack([self._corners(a) for a in starts])
-        thirds = thirds_between(corners[:, [0, 3]])
-        off = _apart(np.concatenate([corners[:, :1], thirds, corners[:, 3:]], axis=1), corners)
-        return {starts[i]: (thirds[i], float(off[i])) for i in np.flatnonzero(off <= self._reach).tolist()}
+    def _level(self) -> Edits:
+        """Return the lines that are nearly level or upright, unless both ends are held by others."""
+        on, after = self._points[:, 0], self._points[self._next, 0]
+        offsets = np.abs(after - on)
+        off, axis = offsets.min(axis=1), offsets.argmin(axis=1)
+        near = self._line & (off >= SAME_COORDINATE) & (off <= LEVEL_SLOPE * offsets.max(axis=1))
+        canvas = self._drawing.scene.canvas
+        size = np.array([canvas.width, canvas.height])
+        held = np.minimum(np.abs(on), np.abs(on - size)) < SAME_COORDINATE
+        level = self._line[:, None] & (offsets < SAME_COORDINATE)
+        held |= level | level[self._previous]
+        at = np.flatnonzero(near)
+        ends = np.stack([at, self._next[at]], axis=1)
+        fixed = held[ends, axis[at][:, None]]
+        values = self._points[ends, 0, axis[at][:, None]]
+        value = np.where(fixed[:, 0], values[:, 0], np.where(fixed[:, 1], values[:, 1], values.mean(axis=1)))
+        found = self._edits(LEVEL, at, NUMBER_BYTES, axis=axis[at], value=value)
+        return found.take(~fixed.all(axis=1))
 
-    def _straight(self, a: int, thirds: Floats, off: float) -> Edit:
-        """Return the edit that makes a line of a cubic."""
-        saved = HANDLES_BYTES * len(self._members(a + 1))
-        points, joints = {}, {}
-        for handle, third in zip((a + 1, a + 2), thirds, strict=True):
-            for m in self._members(handle):
-                points[m], joints[m] = third, Joint.LINE_HANDLE
-        b = self._next[a]
-        for end, beyond in ((a, self._previous[a]), (b, b)):
-            if self._is_line[beyond]:
-                joints |= dict.fromkeys(self._members(end), Joint.CORNER)
-        return Edit("straight", self._at(a + 1), self._cells(a), off, saved, points, joints)
-
-    def _sloping(self) -> dict[int, tuple[int, float]]:
-        """Find the lines that are nearly level or upright: in which axis their ends differ, and how much."""
-        starts = np.array([a for a in self._on if self._is_line[a]], np.intp)
-        offsets = np.abs(self._points[[self._next[a] for a in starts.tolist()]] - self._points[starts])
-        off, along = offsets.min(axis=1), offsets.max(axis=1)
-        near = (off >= SAME_COORDINATE) & (off <= np.minimum(LEVEL_SLOPE * along, self._reach))
-        return _by_point(near, starts, offsets.argmin(axis=1), off)
-
-    def _level_line(self, a: int, axis: int, off: float) -> Edit | None:
-        """Return the edit that makes a line level or upright; None if both of its ends are held."""
-        b = self._next[a]
-        is_held = [self._is_held(end, axis) for end in (a, b)]
-        if all(is_held):
-            return None
-        ends = self._points[[a, b], axis]
-        points = self._moved((a, b), axis, ends[is_held.index(True)] if any(is_held) else ends.mean())
-        cells = self._cells(a, self._previous[a], b)
-        return Edit("level", self._at(a + 1), cells, off, NUMBER_BYTES * len(self._members(a)), points)
-
-    def _moved(self, points: Sequence[int], axis: int, value: Any) -> dict[int, Floats]:
-        """Return points, and all at their places, with a coordinate set to ``value``."""
-        moved = {}
-        for m in (m for p in points for m in self._members(p)):
-            moved[m] = self._points[m].copy()
-            moved[m][axis] = value
-        return moved
-
-    def _is_held(self, p: int, axis: int) -> bool:
-        """Return whether a level or upright line, or the border, holds a coordinate of ``p``."""
-        if min(abs(self._points[p, axis]), abs(self._points[p, axis] - self._size[axis])) < SAME_COORDINATE:
-            return True
-        return any(
-            self._is_line[a] and abs(self._points[end, axis] - self._points[m, axis]) < SAME_COORDINATE
-            for m in self._members(p)
-            for a, end in ((m, self._next[m]), (self._previous[m], self._previous[m]))
-        )
-
-    def _leaning(self) -> dict[int, tuple[int, float]]:
-        """Find the smooth joints whose tangents are nearly level or upright.
-
-        Returns:
-            The axis in which their handles differ little from them, and by how much.
-        """
-        smooth = [p for p in self._on if self._is_smooth[p] and not self._is_line[p]]
-        joints = np.array([p for p in smooth if not self._is_line[self._previous[p]]], np.intp)
-        before = np.array([self._previous[p] for p in joints.tolist()], np.intp)
-        handles = self._points[np.stack([before + 2, joints + 1], axis=1)]
-        offsets = np.abs(handles - self._points[joints][:, None])
-        axes = offsets.sum(axis=1).argmin(axis=1)
-        across = np.take_along_axis(offsets, axes[:, None, None], axis=2)[..., 0]
-        along = np.take_along_axis(offsets, 1 - axes[:, None, None], axis=2)[..., 0]
-        off = across.max(axis=1)
-        near = (off >= SAME_COORDINATE) & (across <= LEVEL_SLOPE * along).all(axis=1)
-        return _by_point(near, joints, axes, off)
-
-    def _level_tangent(self, p: int, axis: int, off: float) -> Edit:
-        """Return the edit that makes the tangent of a smooth joint level or upright."""
-        a = self._previous[p]
-        points = self._moved((a + 2, p + 1), axis, self._points[p, axis])
-        saved = NUMBER_BYTES * len(self._members(p))
-        return Edit("tangent", self._at(p), self._cells(a, p), 0.4 * off, saved, points)
+    def _leaning(self) -> Edits:
+        """Return the smooth joints of cubics whose tangents are nearly level or upright."""
+        before = self._previous
+        at = np.flatnonzero(self._smooth & ~self._line & ~self._line[before])
+        handles = np.stack([self._points[before[at], 2], self._points[at, 1]], axis=1)
+        offsets = np.abs(handles - self._points[at, :1])
+        axis = offsets.sum(axis=1).argmin(axis=1)
+        across = np.take_along_axis(offsets, axis[:, None, None], axis=2)[..., 0]
+        along = np.take_along_axis(offsets, 1 - axis[:, None, None], axis=2)[..., 0]
+        near = (across.max(axis=1) >= SAME_COORDINATE) & (across <= LEVEL_SLOPE * along).all(axis=1)
+        return self._edits(TANGENT, at[near], NUMBER_BYTES, axis=axis[near])
 
 
-def _by_point(
-    chosen: npt.NDArray[np.bool_], points: Indices, axes: Indices, off: Floats
-) -> dict[int, tuple[int, float]]:
-    """Return axis and distance by point, for the chosen ones."""
-    kept = zip(points[chosen].tolist(), axes[chosen].tolist(), off[chosen].tolist(), strict=True)
-    return {point: (axis, distance) for point, axis, distance in kept}
+def applied(drawing: Drawing, edits: Edits) -> tuple[Drawing, Flags]:
+    """Return the drawing after ``edits`` that have no cubics in common, and which cubics are left."""
+    points = drawing.scene.points.astype(np.float64).reshape(-1, 3, 2)
+    joints = drawing.joints.reshape(-1, 3).copy()
+    following, line = drawing.following(), drawing.lines()
+    previous = np.empty_like(following)
+    previous[following] = np.arange(len(following))
+
+    def of(kind: int) -> Edits:
+        return edits.take(edits.kind == kind)
+
+    gone = of(WITHOUT)
+    before = previous[gone.at]
+    points[before, 1:] = gone.handles
+    both = line[gone.at] & line[before]
+    joints[before, 1:] = np.where(both, Joint.LINE_HANDLE, Joint.FREE)[:, None]
+    made = of(STRAIGHT)
+    points[made.at, 1:], joints[made.at, 1:] = made.handles, Joint.LINE_HANDLE
+    joints[made.at[line[previous[made.at]]], 0] = Joint.CORNER
+    after = following[made.at]
+    joints[after[line[after]], 0] = Joint.CORNER
+    level = of(LEVEL)
+    for end in (level.at, following[level.at]):
+        points[end, 0, level.axis] = level.value
+    leaning = of(TANGENT)
+    value = points[leaning.at, 0, leaning.axis]
+    points[leaning.at, 1, leaning.axis] = value
+    points[previous[leaning.at], 2, leaning.axis] = value
+    keep = np.ones(len(points), np.bool_)
+    keep[gone.at] = False
+    scene = replace(drawing.scene, points=points.reshape(-1, 2).astype(np.float32))
+    every = np.repeat(keep, 3)
+    return Drawing(scene.without_points(every), joints.reshape(-1)[every]), keep
+
+
+def apart(edits: Edits, cost: Floats) -> Links:
+    """Choose the edits with the least ``cost`` that have no cubics in common; return their indices."""
+    rank = np.empty(len(cost), np.intp)
+    rank[np.argsort(cost, kind="stable")] = np.arange(len(cost))
+    count = int(edits.around.max(initial=-1)) + 1
+    taken, left = np.zeros(count, np.bool_), np.arange(len(cost))
+    chosen = []
+    while len(left):
+        around = edits.around[left]
+        least = np.full(count, len(cost))
+        np.minimum.at(least, around.ravel(), np.repeat(rank[left], around.shape[1]))
+        first = left[(least[around] == rank[left][:, None]).all(axis=1)]
+        chosen.append(first)
+        taken[edits.around[first]] = True
+        left = left[~taken[around].any(axis=1)]
+    return np.concatenate(chosen) if chosen else np.zeros(0, np.intp)
 
 
 def thirds_between(ends: Floats) -> Floats:
     """Return the points at the thirds of lines, shape (line, 2, 2), between ``ends`` of the same shape."""
     return (2 * ends + ends[:, ::-1]) / 3
-
-
-def _apart(made: Floats, *pieces: Floats) -> Floats:
-    """Return about the largest distance of ``pieces`` from the cubics ``made``, all (cubic, 4, 2)."""
-    t = np.linspace(0, 1, 17)
-    samples = np.concatenate([points_at(piece, t[1:-1:2]) for piece in pieces], axis=1)
-    found = []
-    for first in range(0, len(made), CUBICS_AT_ONCE):
-        curve = points_at(made[first : first + CUBICS_AT_ONCE], t)[:, None]
-        offsets = np.diff(curve, axis=2)
-        behind = samples[first : first + CUBICS_AT_ONCE, :, None] - curve[:, :, :-1]
-        along = (behind * offsets).sum(axis=3) / np.maximum((offsets**2).sum(axis=3), 1e-12)
-        apart = behind - np.clip(along, 0, 1)[..., None] * offsets
-        found.append(np.linalg.norm(apart, axis=3).min(axis=2).max(axis=1))
-    return np.concatenate(found)

@@ -2,42 +2,34 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat.alpha import squares
-from warpsplat.drawing.cells import by_cell, first_apart, sum_within
-from warpsplat.drawing.fit_outlines import Refinement, matching, refine_drawing
-from warpsplat.drawing.nodes import MOST_DISTANCE, Edit, Key, Outlines, applied, turned
+from warpsplat.drawing import model
+from warpsplat.drawing.cells import by_cell
+from warpsplat.drawing.constraints import Constraints, Drawing, Floats, summed
+from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
+from warpsplat.drawing.fit_outlines import OutlineFit, matching
+from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
-from warpsplat.fit.constraints import Constraints, Drawing, Projection
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
-from warpsplat.rendering.backend import Backend, Viewport
-from warpsplat.rendering.models import EXACT
-from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.portable import elementary
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
-TIDY_ROUNDS, FEWEST_ROUNDS = 16, 4
-"""Most rounds in which edits are tried, and how many are left of these for large images."""
+ROUNDS = 16
+"""Most rounds in which edits are tried."""
 
-ROUND_PIXELS = 26_000_000
-"""Most pixels evaluated by all rounds together: on a large image each takes long, and the first find most."""
-
-REFIT = Refinement(steps=50, point_rate=0.1)
-"""Refinement after each round."""
-
-LARGE_PIXELS = 100_000
-"""Size from which on half of these steps suffice [pixels]."""
+FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 12, 8, 4
+"""Renders of the fits before and after nodes are removed, and after rounding."""
 
 LEAST_ERROR = 3e-5
 """Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
@@ -46,8 +38,8 @@ that nobody would miss."""
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
-FARTHEST_OFF = 4.0
-"""How far an edit may move an outline, whatever a byte costs [canvas units]."""
+MEASURED_GRIDS = 2.0, DRAFT_GRID
+"""View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
 
 WORTHWHILE = 0.004
 """Least share of the file's bytes that a round saves for another one to follow."""
@@ -55,13 +47,8 @@ WORTHWHILE = 0.004
 RECOVERED = 10.0
 """Largest error of an edit before refitting, over the largest one after: refitting recovers most of it."""
 
-FIRST_END, ROUNDS_END, SECOND_END = 0.2, 0.75, 0.9
-"""Shares of the progress at which the first refinement, the rounds, and the second refinement are done."""
-
-ROUND_SHARE = 0.1
-"""Share of the remaining progress of the rounds that each refitting takes."""
-
-Floats = npt.NDArray[np.float64]
+FIRST_END, SECOND_END = 0.5, 0.8
+"""Shares of the progress at which the first two fits are done."""
 
 
 class Finished(NamedTuple):
@@ -81,6 +68,7 @@ def finish_drawing(
     finest: float = GRIDS[-1],
     tidy: bool = True,
     price: float = 1.0,
+    symbols: bool = False,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -92,126 +80,112 @@ def finish_drawing(
         finest: most view box units per pixel.
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
+        symbols: whether nearly equal outlines become equal.
     """
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
-    first, second = Refinement() if price == 1 else REFIT, replace(REFIT, steps=2 * REFIT.steps)
-    drawing = refine_drawing(target, drawing, run.part(0.0, FIRST_END), first)
+    fit = OutlineFit(target, drawing, run)
+    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS)
+    if tidy and not run.over():
+        fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
+        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+    equal: list[Equal] = []
     if tidy:
-        drawing = tidied(target, drawing, run.part(FIRST_END, ROUNDS_END), price)
-    drawing = refine_drawing(target, drawing, run.part(ROUNDS_END, SECOND_END), second)
-    if tidy:
-        judge = Judge(target, run.backend)
-        errors = judge.errors(drawing)
-        worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
-        drawing = with_shapes(target, drawing, judge.errors, errors, worth)
-    grid = drawing_grid(target, drawing, run.backend, finest, price)
-    on, _ = drawing.links()
-    low = rounded(drawing.scene, grid)
-    held = held_rounds(low, grid)
-    held[on] = True
-    points = np.where(held[:, None], low.points, drawing.scene.points)
-    drawing = replace(drawing, scene=replace(drawing.scene, points=points))
-    drawing = refine_drawing(target, drawing, run.part(SECOND_END, 1.0), REFIT, held=held)
-    return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+        fitted = fit.drawing
+        exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
+        if exact is not fitted:
+            fit = OutlineFit(target, exact, run, fit.capacity)
+    grid = drawing_grid(fit, finest, price)
+    low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
+    held |= held_rounds(low, grid)
+    held[::3] = True
+    fit.hold(np.where(held[:, None], low.points, fit.points), held)
+    fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
+    drawing = fit.drawing
+    low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
+    return Finished(replace(drawing, scene=low), grid)
 
 
-def tidied(target: FloatArray, drawing: Drawing, run: Run, price: float = 1.0) -> Drawing:
+def with_exact_shapes(
+    target: FloatArray, drawing: Drawing, run: Run, price: float, *, symbols: bool
+) -> tuple[Drawing, list[Equal]]:
+    """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
+
+    def errors_of(made: Drawing) -> Floats:
+        points = Constraints(made).project(made.cubics()[:, :3].reshape(-1, 2))
+        scene = replace(made.scene, points=points.astype(np.float32))
+        away = squares(render(scene, backend=run.backend) - target)
+        viewport = Viewport(target.shape[1], target.shape[0])
+        return by_cell(to_tiles(away[..., None])[:, 0], viewport) / (3 * viewport.pixel_count)
+
+    def refit(made: Drawing) -> Drawing:
+        fit = OutlineFit(target, made, run)
+        fit.advance(replace(run, on_progress=None), SECOND_STEPS)
+        return fit.drawing
+
+    errors = errors_of(drawing)
+    size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
+    worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
+    exact = with_shapes(target, drawing, errors_of, errors, worth)
+    if not symbols:
+        return exact, []
+    return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
+
+
+def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
     """Return a drawing without the nodes, curves and slants that are worth less than their bytes.
 
-    In each round edits that do not overlap are made together and refitted; each is judged by the pixels
-    around it, and if some cost too much, the others are made without them. ``price``: see ``finish_drawing``.
+    In each round edits that do not overlap are made together and the outlines fitted to where the image says
+    that they are; each edit is judged by what is left around it, and if some cost too much, the others are
+    made without them. ``price``: see ``finish_drawing``.
     """
-    refused: set[Key] = set()
-    pixels = target[..., 0].size
-    how, parts = after_round(pixels), run.open_parts(share=ROUND_SHARE)
-    judge = Judge(target, run.backend)
-    errors = judge.errors(drawing)
-    for _ in range(rounds_for(pixels)):
-        edits = apart(Outlines(drawing, reach_at(price)).edits(refused))
-        if not edits or run.over():
-            break
-        size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
-        worth = price * worth_of(errors, size)
-        growth = judge.errors(applied(drawing, edits)) - errors
-        left = [e for e in edits if sum_within(growth, e.cells) <= RECOVERED * e.saved * worth]
-        refused |= {e.key for e in edits} - {e.key for e in left}
-        while left:
-            edited = applied(drawing, left)
-            edited = refine_drawing(target, edited, next(parts), how, capacity=judge.capacity)
-            after = judge.errors(edited)
-            growth = after - errors
-            taken = [e for e in left if sum_within(growth, e.cells) <= e.saved * worth]
-            if len(taken) == len(left):
-                drawing, errors = edited, after
+    drawing, least = fit.drawing, fit.least
+    samples = fit.places()
+    errors = summed(samples.cubic, model.errors(samples, drawing.cubics()), len(drawing.joints) // 3)
+    rest = fit.error - errors.sum()
+    size = first = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
+    refused = np.zeros((len(errors), 4), np.bool_)
+    for _ in range(ROUNDS):
+        edits = Outlines(drawing).edits(refused)
+        worth = price * byte_worth(max(rest + float(errors.sum()), LEAST_ERROR), size)
+        growth = model.before_fit(samples, drawing, edits)
+        cheap = growth <= RECOVERED * edits.saved * worth
+        edits, growth = edits.take(cheap), growth[cheap]
+        left = edits.take(apart(edits, growth / edits.saved))
+        while len(left.at):
+            edited, keep = applied(drawing, left)
+            moved = model.carried(samples, drawing, left, keep)
+            edited, moved, after = model.fitted(moved, edited, least)
+            every = np.zeros(len(keep))
+            every[keep] = after
+            change = every - errors
+            around = np.sort(left.around, axis=1)
+            fresh = np.concatenate([np.ones((len(around), 1), np.bool_), np.diff(around, axis=1) > 0], axis=1)
+            taken = (change[around] * fresh).sum(axis=1) <= left.saved * worth
+            refused[left.at[~taken], left.kind[~taken]] = True
+            if taken.all():
+                drawing, samples, errors, refused = edited, moved, after, refused[keep]
                 break
-            refused |= {e.key for e in left} - {e.key for e in taken}
-            left = taken
-        drawing = turned(drawing)
-        if sum(e.saved for e in left) < WORTHWHILE * size:
+            left = left.take(taken)
+        size -= int(left.saved.sum())
+        if left.saved.sum() < WORTHWHILE * first:
             break
     return drawing
 
 
-def reach_at(price: float) -> float:
-    """Return how far an edit may move an outline [canvas units]: the error grows with the square of that."""
-    return min(MOST_DISTANCE * math.sqrt(price), FARTHEST_OFF)
-
-
-def after_round(pixels: int) -> Refinement:
-    """Return how a drawing on an image of so many pixels is refitted after each round."""
-    return replace(REFIT, steps=REFIT.steps // 2) if pixels > LARGE_PIXELS else REFIT
-
-
-def rounds_for(pixels: int) -> int:
-    """Return the most rounds for an image of so many pixels."""
-    return max(FEWEST_ROUNDS, min(TIDY_ROUNDS, ROUND_PIXELS // pixels))
-
-
-class Judge:
-    """Compares drawings with one image."""
-
-    def __init__(self, target: FloatArray, backend: Backend) -> None:
-        self._backend = backend
-        self._viewport = Viewport(target.shape[1], target.shape[0])
-        self._target = to_tiles(target)
-        self.capacity: Capacity | None = None
-        """Capacity of a renderer that the last drawing fits into, and likely the next."""
-
-    def errors(self, drawing: Drawing) -> Floats:
-        """Return the share of each cell in the mean squared error, as ``by_cell``."""
-        parameters = Parameters(drawing.scene, self._backend)
-        Projection(Constraints.of(drawing), parameters).project()
-        renderer = Renderer(parameters, self._viewport, model=EXACT, capacity=self.capacity)
-        renderer.forward_complete()
-        self.capacity = renderer.capacity
-        film = renderer.film.buffers
-        residual = squares(film.image.numpy() - self._target, axis=1) * film.inside.numpy()
-        return by_cell(residual, self._viewport) / (3 * self._viewport.pixel_count)
-
-
-def worth_of(errors: Floats, size: int) -> float:
-    """Return the mean squared error that a byte is worth, in a file of ``size`` bytes."""
-    return byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
-
-
-def apart(edits: Sequence[Edit]) -> list[Edit]:
-    """Return the edits with the least error for the bytes saved, no two with pixels in common."""
-    ranked = sorted(edits, key=lambda e: (e.off / e.saved, e.key))
-    return [ranked[i] for i in first_apart(edit.cells for edit in ranked)]
-
-
-def drawing_grid(
-    target: FloatArray, drawing: Drawing, backend: Backend, finest: float, price: float = 1.0
-) -> float:
+def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
-    judge = Judge(target, backend)
-    errors = judge.errors(drawing)
-    worth = price * worth_of(errors, len(write_svg(drawing.scene, per_pixel=DRAFT_GRID)))
+    scene, samples = fit.drawing.scene, fit.places()
+    before = model.errors(samples, fit.drawing.cubics()).sum()
+    coarse, fine = (len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS)
+    worth = price * byte_worth(max(fit.error, LEAST_ERROR), fine)
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
-        low = replace(drawing, scene=rounded(drawing.scene, grid))
-        loss = float(judge.errors(low).sum() - errors.sum())
-        costs[grid] = 2 * STAGED_COST * loss + worth * len(write_svg(low.scene, per_pixel=grid))
+        low = replace(fit.drawing, scene=rounded(scene, grid))
+        loss = float(model.errors(samples, low.cubics()).sum() - before)
+        doublings = elementary.log2(grid / MEASURED_GRIDS[0]) / elementary.log2(
+            MEASURED_GRIDS[1] / MEASURED_GRIDS[0]
+        )
+        costs[grid] = 2 * STAGED_COST * loss + worth * (fine - coarse) * doublings
     return min(costs, key=costs.__getitem__)

@@ -185,8 +185,6 @@ def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
     reset = _with_twins(scene, invalid if invalid.any() else flagged)
     state.renewed += int(reset.sum())
     parameters.reset(reset)
-    if state.projection:
-        state.projection.project()
     step.render()
     reset[: state.base] = False
     if not (replaces and reset.any()):

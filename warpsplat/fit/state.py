@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from warpsplat.fit.constraints import Projection
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Moments, Parameters
 from warpsplat.scene import Scene
@@ -40,8 +39,6 @@ class FitState:
     """Steps done."""
     per_pixel: float = GRIDS[-1]
     """View box units per pixel in the file."""
-    projection: Projection | None = None
-    """The constraints of outlines, if there are any."""
     base: int = 0
     """Number of the first shapes, those of earlier levels (``fit.layered``), which stay."""
     opacities_frozen: bool = False

@@ -96,11 +96,7 @@ class Step:
         update = backend.program("update")
         for loss in losses.SHAPE_LOSSES:
             loss.record(update, inputs)
-        if state.projection:
-            state.projection.record_adjoint(update)
         record_adam(update, state.parameters, state.clock, self.settings)
-        if state.projection:
-            state.projection.record(update)
         target = self._level_target
         levels = [replace(inputs, renderer=renderer, target=target) for renderer in self.level_renderers]
         self.programs: tuple[Program, ...] = (

@@ -138,7 +138,7 @@ def test_the_smallest_pictures(shape: tuple[int, ...]) -> None:
     image = np.random.default_rng(0).random(shape).astype(np.float32)
     image[..., :3] *= image[..., 3:] if shape[2] == 4 else 1
     traced = trace(image)
-    assert len(traced.joints) == len(traced.same) == len(traced.scene.points)
+    assert len(traced.joints) == len(traced.scene.points)
     assert np.isfinite(traced.scene.points).all()
 
 

@@ -1,0 +1,115 @@
+"""Where the image has outlines, and what moving them costs, against renders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon
+from warpsplat.alpha import squares
+from warpsplat.drawing.constraints import Constraints, Drawing
+from warpsplat.drawing.fit_outlines import OutlineFit, matching
+from warpsplat.drawing.model import errors, fitted
+from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.fit.problem import Run
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import Canvas, FloatArray
+
+
+def moved(made: Drawing, offset: tuple[float, float]) -> Drawing:
+    points = made.scene.points + np.array(offset, np.float32)
+    return replace(made, scene=replace(made.scene, points=points))
+
+
+@pytest.mark.parametrize("background", [WHITE, None], ids=["opaque", "transparent"])
+def test_the_image_tells_where_outlines_are(device: str, background: FloatArray | None) -> None:
+    """And what moving them costs: the error of the samples is that of the render."""
+    exact = drawing(
+        Canvas(64, 64, background),
+        (BLUE, [disc(32, 32, 20, 0.2)]),
+        (GOLD, [polygon((24, 24), (42, 27), (30, 40))]),
+    )
+    backend = Backend.on(device, 1)
+    target = matching(render(exact.scene, backend=backend), exact.scene.canvas)
+    offset = (0.3, -0.2)
+    fit = OutlineFit(target, moved(exact, offset), Run(backend))
+    found = fit.places()
+    at = fit.drawing.cubics()[found.cubic]
+    off = (found.across * -np.array(offset)).sum(axis=1)
+    t = found.t[:, None]
+    s = 1 - t
+    here = s**3 * at[:, 0] + 3 * s * s * t * at[:, 1] + 3 * s * t * t * at[:, 2] + t**3 * at[:, 3]
+    got = ((found.place - here) * found.across).sum(axis=1)
+    shares = found.weight / found.weight.sum()
+    assert (shares * (got - off) ** 2).sum() < 0.1 * (shares * off**2).sum()
+    total = errors(found, fit.drawing.cubics()).sum()
+    assert total == pytest.approx(fit.error, rel=0.25)
+
+
+def test_the_gradient_is_that_of_the_render(device: str) -> None:
+    """Against central differences along free numbers."""
+    backend = Backend.on(device, 1)
+    exact = logo()
+    target = render(exact.scene, backend=backend)
+    fit = OutlineFit(target, moved(exact, (0.25, 0.15)), Run(backend))
+    freedom = Constraints(exact).freedom(fit.points)
+    fit._measure.error(fit.points)
+    gradient = freedom.adjoint(fit._measure.gradient())
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        way = rng.normal(size=freedom.size)
+        shift = 2e-3 * freedom.times(way).reshape(-1, 2)
+        ends = [fit._measure.error(fit.points + sign * shift)[0] for sign in (1, -1)]
+        assert (ends[0] - ends[1]) / 4e-3 == pytest.approx(gradient @ way, rel=0.05, abs=2e-6)
+
+
+def test_the_error_counts_far_tiles(device: str) -> None:
+    """Those without outlines are compared once."""
+    backend = Backend.on(device, 1)
+    made = drawing(Canvas(96, 80, WHITE), (RED, [disc(20, 20, 8)]))
+    target = render(made.scene, backend=backend)
+    target[60:70, 70:90] = 0
+    fit = OutlineFit(target, made, Run(backend))
+    assert fit.error == pytest.approx(
+        squares(render(made.scene, backend=backend) - target).mean() / 3, rel=1e-5
+    )
+
+
+def test_the_normal_equations() -> None:
+    """Against dense ones in float64."""
+    made, rng = logo(), np.random.default_rng(1)
+    fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
+    samples, following = fit.places(), made.following()
+    bending, points = Bending(samples, following), fit.points
+    gradient = bending.error_and_gradient(points)[1]
+    size = points.size
+    change = rng.normal(size=size)
+    h = 1e-4
+    ends = [bending.error_and_gradient(points + sign * h * change.reshape(-1, 2)) for sign in (1, -1)]
+    assert (ends[0][0].sum() - ends[1][0].sum()) / (2 * h) == pytest.approx(gradient @ change, rel=1e-5)
+    np.testing.assert_allclose((ends[0][1] - ends[1][1]) / (2 * h), bending.times(change), atol=1e-9)
+    freedom = Constraints(made).freedom(points)
+    damping, least = np.full(len(following), 0.1), 1e-7
+    step = newton_step(bending, freedom, gradient, damping, least)
+    wide = np.stack([freedom.times(row) for row in np.eye(freedom.size)], axis=1)
+    curvature = wide.T @ np.stack([bending.times(column) for column in wide.T], axis=1)
+    squared = np.bincount(
+        freedom.column, freedom.value**2 * bending.stiffness(damping)[freedom.row], freedom.size
+    )
+    want = np.linalg.solve(curvature + np.diag(squared + least), -freedom.adjoint(gradient))
+    assert np.linalg.norm(wide @ (step - want)) < 0.05 * np.linalg.norm(wide @ want)
+
+
+def test_outlines_follow_their_places() -> None:
+    """Without a render, nearly as far as with one."""
+    made = logo()
+    fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
+    samples = fit.places()
+    before = errors(samples, fit.drawing.cubics()).sum()
+    after = fitted(samples, fit.drawing, fit.least)
+    assert after[2].sum() < 0.1 * before
+    again = OutlineFit(render(made.scene), after[0], Run(Backend.on("cpu", 1)))
+    assert again.error < 0.15 * fit.error

@@ -1,0 +1,286 @@
+"""Where the image says that a drawing's outlines are: from one render, its adjoint and the contrast there.
+
+Moving an outline by d across itself changes the squared error by contrast^2 (d - d0)^2 for each unit of its
+length, where d0 is the distance at which the image has it. The adjoint gives the first derivative of that,
+and of each channel of the image the contrast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.alpha import squares
+from warpsplat.drawing.constraints import Drawing, Floats, Links, summed, with_ends
+from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.models import EXACT
+from warpsplat.rendering.outline import Outline, OutlineBuffers
+from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.tiles import TILE, to_tiles
+from warpsplat.scene import GRADIENTS, FloatArray, Scene
+
+GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
+"""Where on a piece of an outline samples lie, with equal weights: exact for cubic functions."""
+
+FARTHEST = 1.5
+"""How far from an outline the image can have it: beyond, it is not this outline [px]."""
+
+LEAST_CONTRAST, FAINT, HIDDEN = 1e-4, 0.01, 0.1
+"""Squares of the contrast below which an outline is not seen, that the faintest seen ones count as, and that
+those count as which are not seen: if they move, what they hide may show."""
+
+MARGIN = 4
+"""How far from the outlines the error is followed, at least [px]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places on outlines, in their order."""
+
+    cubic: Links
+    """The cubic that each lies on, ascending, shape (sample,)."""
+    t: Floats
+    """Where on it, shape (sample,)."""
+    place: Floats
+    """Where the image has the outline, shape (sample, 2)."""
+    across: Floats
+    """Unit vectors across the outline, shape (sample, 2)."""
+    weight: Floats
+    """By how much the mean squared error grows for each square of the distance across, shape (sample,)."""
+
+    def take(self, index: Links) -> Samples:
+        """Return the samples ``index``, in that order."""
+        return Samples(**{name: values[index] for name, values in vars(self).items()})
+
+
+def bernstein(t: Floats) -> Floats:
+    """Return the weights of a cubic's control points at ``t``, shape (sample, 4)."""
+    s = 1 - t
+    return np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=-1)
+
+
+def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
+    """Return which shapes have gradients, shape (shape,)."""
+    return np.isin(scene.paint, GRADIENTS)
+
+
+def slopes_at(cubics: Floats, t: Floats) -> Floats:
+    """Return the derivatives by ``t`` of cubics, shape (sample, 4, 2), at ``t``, shape (sample,)."""
+    legs, s, u = 3 * np.diff(cubics, axis=1), (1 - t)[:, None], t[:, None]
+    return np.asarray(s * s * legs[:, 0] + 2 * s * u * legs[:, 1] + u * u * legs[:, 2])
+
+
+class Surroundings:
+    """The pixels around each cubic, and the tiles that have some."""
+
+    def __init__(self, cubics: Floats, viewport: Viewport) -> None:
+        """``cubics``: shape (cubic, 4, 2) [px]."""
+        reach = np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1)
+        counts = 2 + np.minimum(np.ceil(reach), viewport.width + viewport.height).astype(np.intp)
+        which = np.repeat(np.arange(len(cubics)), counts)
+        number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+        t = (number + 0.5) / counts[which]
+        x, y = np.floor((bernstein(t)[..., None] * cubics[which]).sum(axis=1)).astype(np.intp).T
+        limits = np.array([viewport.width, viewport.height])
+        corners = np.stack(
+            [np.stack([x + i, y + j], axis=1) for i in (-MARGIN, MARGIN) for j in (-MARGIN, MARGIN)]
+        )
+        column, row = np.clip(corners.reshape(-1, 2), 0, limits - 1).T // TILE
+        self.tiles: Links = np.unique(row * viewport.tiles_x + column)
+        wide, high = limits + 2
+        x, y = np.clip(x + 1, 0, wide - 1), np.clip(y + 1, 0, high - 1)
+        middle = np.unique((which * high + y) * wide + x)
+        near = np.unique(middle[:, None] + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)]))
+        x, y = near % wide - 1, near % (wide * high) // wide - 1
+        inside = (x >= 0) & (x < viewport.width) & (y >= 0) & (y < viewport.height)
+        near, x, y = near[inside], x[inside], y[inside]
+        self._cubic, self._count = near // (wide * high), len(cubics)
+        self._tile = y // TILE * viewport.tiles_x + x // TILE
+        self._place = x % TILE * TILE + y % TILE
+        self.follow(self.tiles)
+
+    def follow(self, tiles: Links) -> None:
+        """Take ``tiles``, ascending, with those around the cubics."""
+        self.tiles = tiles
+        self._pixel = np.searchsorted(tiles, self._tile) * TILE * TILE + self._place
+
+    def sums(self, pixels: FloatArray) -> Floats:
+        """Return sums of ``pixels`` of ``tiles`` around each cubic, shape (cubic,)."""
+        return summed(self._cubic, pixels.ravel()[self._pixel], self._count)
+
+
+class Measure:
+    """Renders outlines of a drawing over and over and compares them with an image."""
+
+    def __init__(
+        self,
+        target: FloatArray,
+        drawing: Drawing,
+        points: Floats,
+        backend: Backend,
+        capacity: Capacity | None = None,
+    ) -> None:
+        """``points``: where the outlines begin; ``capacity``: of the renderer, if it is known."""
+        self._following = drawing.following()
+        self._parameters = Parameters(drawing.scene, backend)
+        self._parameters.keeps_colors = True
+        viewport = Viewport(target.shape[1], target.shape[0])
+        self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
+        self._scale = 1 / (3 * viewport.pixel_count)
+        self.least = LEAST_CONTRAST * self._scale
+        """Curvature that does not count."""
+        self._near = Surroundings(with_ends(points, self._following), viewport)
+        if is_shaded(drawing.scene).any():
+            self._near.follow(np.arange(viewport.tile_count))
+        self._tiles = self._near.tiles
+        goal = to_tiles(target)
+        self._target = goal[self._tiles]
+        self._inside = self._renderer.film.buffers.inside.numpy()[self._tiles, None]
+        self._grad = np.zeros_like(goal)
+        self._render(points)
+        elsewhere = np.ones(len(goal), np.bool_)
+        elsewhere[self._tiles] = False
+        film = self._renderer.film.buffers
+        rest = (film.image.numpy()[elsewhere] - goal[elsewhere]) * film.inside.numpy()[elsewhere, None]
+        self._rest = float(squares(rest, axis=1).sum(dtype=np.float64))
+
+    @property
+    def capacity(self) -> Capacity:
+        """Capacity of the renderer's arrays."""
+        return self._renderer.capacity
+
+    def paint(self, frames: Floats) -> None:
+        """Place the gradients of shapes."""
+        self._parameters.groups["frames"].value.assign(frames.astype(np.float32))
+
+    def frames_gradient(self) -> Floats:
+        """Return the derivative of the last ``gradient``'s error by the frames, shape (shape, 6)."""
+        return self._parameters.groups["frames"].grad.numpy().astype(np.float64)
+
+    def _render(self, points: Floats) -> None:
+        self._parameters.groups["points"].value.assign(points.astype(np.float32))
+        self._renderer.forward_complete()
+        self._is_fresh = True
+
+    def error(self, points: Floats) -> tuple[float, Floats]:
+        """Return the mean squared error with the outlines at ``points``, and the part around each cubic."""
+        self._render(points)
+        self._residual = (
+            self._renderer.film.buffers.image.numpy()[self._tiles] - self._target
+        ) * self._inside
+        parts = squares(self._residual, axis=1)
+        total = self._rest + float(parts.sum(dtype=np.float64))
+        return total * self._scale, self._near.sums(parts) * self._scale
+
+    def gradient(self) -> Floats:
+        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,)."""
+        self._back(self._by_image())
+        return self._parameters.arrays["points_grad"].numpy().astype(np.float64).ravel()
+
+    def look(self) -> None:
+        """Measure the contrasts across the outlines as they are now."""
+        cubic, _, vertex, following = self._pieces()
+        normal, length = self._across(vertex, following)
+        square = np.zeros(len(vertex))
+        for channel in self._channels():
+            self._back(channel)
+            square += ((self._piece_grads(vertex).sum(axis=1) * normal).sum(axis=1) / length) ** 2
+        seen = square > LEAST_CONTRAST
+        self._contrast = np.where(seen, np.maximum(square, FAINT), HIDDEN) * self._scale
+        self._counts = np.bincount(cubic, minlength=len(self._following))
+
+    def samples(self, points: Floats, counts: Links | None = None) -> Samples:
+        """Return samples of the outlines at ``points``, on themselves.
+
+        ``counts``: pieces of the cubics, two samples on each; without, as they were looked at.
+        """
+        counts = self._counts if counts is None else counts
+        cubic = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(cubic)) - (np.cumsum(counts) - counts)[cubic]
+        t = ((number[:, None] + GAUSS) / counts[cubic][:, None]).ravel()
+        known = (2 * number + 1) * self._counts[cubic] // (2 * counts[cubic])
+        contrast = self._contrast[(np.cumsum(self._counts) - self._counts)[cubic] + known]
+        weight = np.repeat(contrast * 0.5 / counts[cubic], 2)
+        cubics, cubic = with_ends(points, self._following), np.repeat(cubic, 2)
+        ahead = slopes_at(cubics[cubic], t)
+        speed = np.linalg.norm(ahead, axis=1)
+        normal = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.maximum(speed, 1e-9)[:, None]
+        where = (bernstein(t)[..., None] * cubics[cubic]).sum(axis=1)
+        return Samples(cubic, t, where, normal, weight * speed)
+
+    def places(self, points: Floats) -> Samples:
+        """Return samples at ``points``, those of the last ``error``, where the image has outlines."""
+        self._back(self._by_image())
+        cubic, _, vertex, following = self._pieces()
+        normal, _ = self._across(vertex, following)
+        slope = (self._piece_grads(vertex) * normal[:, None]).sum(axis=2)
+        found = self.samples(points, np.bincount(cubic, minlength=len(self._following)))
+        # A distance that is linear along the piece has these ends, and these values at the samples.
+        weight = np.maximum(found.weight.reshape(-1, 2).sum(axis=1), 1e-30)
+        ends = -np.stack([2 * slope[:, 0] - slope[:, 1], 2 * slope[:, 1] - slope[:, 0]], axis=1)
+        ends /= weight[:, None]
+        away = np.clip(ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * GAUSS, -FARTHEST, FARTHEST)
+        return replace(found, place=found.place + away.reshape(-1, 1) * found.across)
+
+    def _across(self, vertex: Links, following: Links) -> tuple[Floats, Floats]:
+        """Return unit normals and lengths of straight pieces."""
+        at = self._outline.vertex.numpy().astype(np.float64)
+        edge = at[following] - at[vertex]
+        length = np.maximum(np.linalg.norm(edge, axis=1), 1e-9)
+        return np.stack([-edge[:, 1], edge[:, 0]], axis=1) / length[:, None], length
+
+    @property
+    def _outline(self) -> OutlineBuffers:
+        geometry = self._renderer.geometry
+        assert isinstance(geometry, Outline)
+        return geometry.buffers
+
+    def _pieces(self) -> tuple[Links, Links, Links, Links]:
+        """Return cubic, number in it, first and second vertex of the straight pieces."""
+        b, arrays = self._outline, self._parameters.arrays
+        counts = b.bezier_pieces.numpy().astype(np.intp)
+        shape = arrays["contour_shape"].numpy()[arrays["bezier_contour"].numpy()]
+        base = b.vertex_first.numpy()[shape] + b.bezier_vertex.numpy()
+        cubic = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(cubic)) - np.repeat(np.cumsum(counts) - counts, counts)
+        vertex = base[cubic] + number
+        return cubic, number, vertex, b.vertex_next.numpy()[vertex]
+
+    def _piece_grads(self, vertex: Links) -> Floats:
+        """Return the gradients of the two ends of the pieces that begin at vertices, shape (piece, 2, 2)."""
+        b = self._outline
+        ends = [grad.numpy()[vertex] for grad in (b.start_grad, b.end_grad)]
+        return np.stack(ends, axis=1).astype(np.float64)
+
+    def _back(self, image_grad: FloatArray) -> None:
+        """Compute the adjoint, which takes the place of the coverages: each needs a render of its own."""
+        if not self._is_fresh:
+            self._renderer.forward()
+        self._is_fresh = False
+        self._grad[self._tiles] = image_grad
+        self._renderer.film.buffers.image_grad.assign(self._grad)
+        self._renderer.backward()
+
+    def _by_image(self) -> FloatArray:
+        """Return the derivative of the mean squared error by the image."""
+        if self._residual.shape[1] == 3:
+            return self._residual * np.float32(2 * self._scale)
+        color, opacity = self._residual[:, :3], self._residual[:, 3:]
+        back = 3 * opacity - color.sum(axis=1, keepdims=True)
+        return np.concatenate([2 * color - opacity, back], axis=1) * np.float32(self._scale)
+
+    def _channels(self) -> Iterator[FloatArray]:
+        """Yield gradients of the image whose squares add up to the squared error's.
+
+        With opacity a, on black and on white, they are r - a/2, g - a/2, b - a/2 and a by the root of 3/4.
+        """
+        planes = self._residual.shape[1]
+        for channel in range(planes):
+            shares = np.eye(planes, dtype=np.float32)[channel]
+            if planes == 4:
+                shares[3] = -0.5 if channel < 3 else np.sqrt(np.float32(0.75))
+            yield shares[None, :, None, None] * self._inside

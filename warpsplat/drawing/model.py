@@ -1,0 +1,129 @@
+"""Outlines fitted to where the image says that they are, without a render."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, summed, with_ends
+from warpsplat.drawing.measure import Samples, bernstein
+from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits
+from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.scene.scene import ranges
+
+STEPS, PLACING_ROUNDS = 2, 2
+"""Steps of a fit, and of finding where on its piece a sample lies before each."""
+
+DAMPING = 0.01
+"""Added curvature, as a share."""
+
+
+def placed(samples: Samples, cubics: Floats, rounds: int = PLACING_ROUNDS) -> Samples:
+    """Return samples at the places of ``cubics``, shape (cubic, 4, 2), that are nearest to theirs."""
+    t, corners = samples.t, cubics[samples.cubic]
+    slopes = 3 * np.diff(corners, axis=1)
+    bends = 2 * np.diff(slopes, axis=1)
+    for _ in range(rounds):
+        s, u = (1 - t)[:, None], t[:, None]
+        away = (bernstein(t)[..., None] * corners).sum(axis=1) - samples.place
+        speed = s * s * slopes[:, 0] + 2 * s * u * slopes[:, 1] + u * u * slopes[:, 2]
+        bend = s * bends[:, 0] + u * bends[:, 1]
+        first = (away * speed).sum(axis=1)
+        second = (speed * speed).sum(axis=1) + np.maximum((away * bend).sum(axis=1), 0)
+        t = np.clip(t - first / np.maximum(second, 1e-12), 0, 1)
+    return replace(samples, t=t)
+
+
+def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
+    """Return by how much each edit alone lets the error grow if nothing else follows it, shape (edit,)."""
+    cubics, count = drawing.cubics(), len(drawing.joints) // 3
+    following = drawing.following()
+    previous = np.empty_like(following)
+    previous[following] = np.arange(count)
+    before, after = previous[edits.at], following[edits.at]
+    cubic = np.stack([cubics[before], cubics[edits.at], cubics[after]], axis=1)
+    kind = edits.kind
+    made = np.flatnonzero(kind == WITHOUT)
+    whole = np.concatenate([cubic[made, 0, :1], edits.handles[made], cubic[made, 1, 3:]], axis=1)
+    cubic[made, 0] = cubic[made, 1] = whole
+    made = np.flatnonzero(kind == STRAIGHT)
+    cubic[made, 1, 1:3] = edits.handles[made]
+    rows = np.flatnonzero(kind == LEVEL)
+    axis, value = edits.axis[rows], edits.value[rows]
+    for k, corners in ((0, (3,)), (1, (0, 3)), (2, (0,))):
+        for corner in corners:
+            cubic[rows, k, corner, axis] = value
+    ends = cubic[rows, 1][:, [0, 3]]
+    cubic[rows, 1, 1], cubic[rows, 1, 2] = (
+        (2 * ends[:, 0] + ends[:, 1]) / 3,
+        (ends[:, 0] + 2 * ends[:, 1]) / 3,
+    )
+    rows = np.flatnonzero(kind == TANGENT)
+    value = cubic[rows, 1, 0, edits.axis[rows]]
+    cubic[rows, 0, 2, edits.axis[rows]] = cubic[rows, 1, 1, edits.axis[rows]] = value
+    growth = np.zeros(len(kind))
+    bounds = np.searchsorted(samples.cubic, np.arange(count + 1))
+    old = summed(samples.cubic, errors(samples, cubics), count)
+    first_length, second_length = (chords(cubics[rows]) for rows in (before, edits.at))
+    share = first_length / np.maximum(first_length + second_length, 1e-9)
+    for k, rows in enumerate((before, edits.at, after)):
+        counts = bounds[rows + 1] - bounds[rows]
+        number = ranges(bounds[rows], counts)
+        which = np.repeat(np.arange(len(kind)), counts)
+        part = samples.take(number)
+        t = part.t
+        if k < 2:
+            joined = (kind == WITHOUT)[which]
+            inside = t * share[which] if k == 0 else share[which] + t * (1 - share[which])
+            t = np.where(joined, inside, t)
+        part = placed(replace(part, cubic=which, t=t), cubic[:, k])
+        growth += summed(which, errors(part, cubic[:, k]), len(kind)) - old[rows]
+    return growth
+
+
+def chords(cubics: Floats) -> Floats:
+    """Return the lengths of the control polygons."""
+    return np.asarray(np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1))
+
+
+def errors(samples: Samples, cubics: Floats) -> Floats:
+    """Return the errors of the samples on ``cubics``."""
+    at = (bernstein(samples.t)[..., None] * cubics[samples.cubic]).sum(axis=1)
+    return np.asarray(samples.weight * ((at - samples.place) * samples.across).sum(axis=1) ** 2)
+
+
+def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
+    """Return samples of ``drawing`` on the cubics that ``edits`` leave."""
+    cubics = drawing.cubics()
+    following = drawing.following()
+    previous = np.empty_like(following)
+    previous[following] = np.arange(len(keep))
+    lengths = chords(cubics)
+    gone = edits.at[edits.kind == WITHOUT]
+    before = previous[gone]
+    low, high = np.zeros(len(keep)), np.ones(len(keep))
+    high[before] = low[gone] = lengths[before] / np.maximum(lengths[before] + lengths[gone], 1e-9)
+    t = low[samples.cubic] + (high - low)[samples.cubic] * samples.t
+    owner = np.arange(len(keep))
+    owner[gone] = before
+    number = np.cumsum(keep) - 1
+    cubic = number[owner][samples.cubic]
+    order = np.argsort(cubic, kind="stable")
+    return replace(samples, t=t, cubic=cubic).take(order)
+
+
+def fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Drawing, Samples, Floats]:
+    """Fit outlines to ``samples``; return them, the samples on them, and the errors by cubic."""
+    constraints, following = Constraints(drawing), drawing.following()
+    points = constraints.project(drawing.scene.points.astype(np.float64))
+    samples = placed(samples, with_ends(points, following))
+    damping = np.full(len(following), DAMPING)
+    for _ in range(STEPS):
+        bending, freedom = Bending(samples, following), constraints.freedom(points)
+        gradient = bending.error_and_gradient(points)[1]
+        change = np.clip(newton_step(bending, freedom, gradient, damping, least), -1, 1)
+        points = constraints.project(points + freedom.times(change).reshape(-1, 2))
+        samples = placed(samples, with_ends(points, following))
+    found = summed(samples.cubic, errors(samples, with_ends(points, following)), len(following))
+    return replace(drawing, scene=replace(drawing.scene, points=points.astype(np.float32))), samples, found
