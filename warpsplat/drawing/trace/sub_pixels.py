@@ -7,6 +7,7 @@ sub-pixel boundaries from remotely sensed images").
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,7 +166,7 @@ def _attraction(windows: Ints, kernel: Ints) -> Ints:
 def _give(small: Ints, mixed: _Mixed, some: Ints, counts: Ints, lead: Ints) -> None:
     """Give the sub-pixels of ``some`` pixels where its ``lead`` is largest to the first colour."""
     size = lead.shape[1]
-    scale = round(size**0.5)
+    scale = math.isqrt(size)
     order = np.argsort(-lead, axis=1, kind="stable")
     first = np.empty(lead.shape, np.bool_)
     np.put_along_axis(first, order, np.arange(size) < counts[:, None], axis=1)
