@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight as straight_color
-from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
 from warpsplat.drawing.trace.grids import Bools, Floats
@@ -82,10 +82,15 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
+    found = [
+        (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
+        for region, outline in outlines
+    ]
+    known = [(region, contour) for region, contour in found if contour is not None]
     contours: dict[int, list[Pieces]] = {}
-    for region, outline in outlines:
-        contour = assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline])
-        if contour is not None and len(contour.cubics) > 1:
+    joined = with_joined_lines([contour for _, contour in known])
+    for (region, _), contour in zip(known, joined, strict=True):
+        if len(contour.cubics) > 1:
             contours.setdefault(region, []).append(replace(contour, cubics=contour.cubics / regions.scale))
     shapes = [
         Fill(regions.colorings[regions.paint[region]], contours[region])
@@ -135,7 +140,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     points = [contour.cubics[:, :3].reshape(-1, 2) for contour in contours]
     colors = np.array([shape.coloring.color for shape in shapes]).reshape(-1, 4)
     has_ramp = np.array([shape.coloring.ramp is not None for shape in shapes], np.bool_)
-    joints = np.concatenate([*map(joints_of, contours), np.zeros(0, np.int32)])
+    joints = joints_of(contours)
     scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),
