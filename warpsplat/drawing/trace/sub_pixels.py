@@ -48,7 +48,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     height, width = regions.labels.shape
     scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
     used = np.unique(regions.paint).tolist()
-    is_flat = all(regions.colorings[k].ramp is None for k in used)
+    is_flat = all(regions.colorings[k].ramp is None and not regions.colorings[k].is_band for k in used)
     if scale == 1 or regions.noise or not is_flat or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
@@ -160,7 +160,7 @@ def _attraction(windows: Ints, kernel: Ints) -> Ints:
     places = range(kernel.shape[1])
     down = np.sum([windows[:, i, None] * kernel[:, i, None] for i in places], axis=0)
     across = np.sum([down[:, :, i, None] * kernel[:, i] for i in places], axis=0)
-    return np.asarray(across.reshape(len(windows), -1))
+    return np.asarray(across.reshape(len(windows), len(kernel) * len(kernel)))
 
 
 def _give(small: Ints, mixed: _Mixed, some: Ints, counts: Ints, lead: Ints) -> None:
