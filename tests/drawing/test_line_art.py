@@ -15,7 +15,6 @@ from tests.runs import scored, vectorize
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.prepare import choose_subject
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 
@@ -109,15 +108,6 @@ def test_areas_alone_are_fills(device: str) -> None:
     result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
     assert result.scene.kind.tolist() == [Kind.FILL]
     assert scored(result).psnr > 34
-
-
-def test_mixed_lets_auto_see_line_art_and_nothing_else() -> None:
-    line = drawn("".join(f'<path d="M{x} 8L{90 - x} 64"/>' for x in (8, 20, 50, 70)))
-    settings = make_settings(mixed=True)
-    assert choose_subject(line, settings)[0].subject == "line"
-    noise = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
-    chosen, why = choose_subject(noise, settings)
-    assert (chosen.subject, why) == ("photo", "mixed is for fitted shapes")
 
 
 def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:

@@ -241,8 +241,9 @@ def eigh(matrix: Matrices) -> tuple[Result, Result]:
 
 
 def principal_direction(points: Matrices) -> Result:
-    """Return the unit vector (2,) along which points (n, 2) spread most about their mean."""
+    """Return the unit vectors (..., 2) along which points (..., n, 2) spread most about their mean."""
     points = np.asarray(points, np.float64)
-    x, y = (points - points.mean(axis=0)).T
-    mixed = (x * y).sum()
-    return eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
+    x, y = np.moveaxis(points - points.mean(axis=-2, keepdims=True), -1, 0)
+    mixed = (x * y).sum(axis=-1)
+    matrix = np.stack([(x * x).sum(axis=-1), mixed, mixed, (y * y).sum(axis=-1)], axis=-1)
+    return eigh(matrix.reshape(*mixed.shape, 2, 2))[1][..., :, 1]

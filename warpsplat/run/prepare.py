@@ -127,16 +127,15 @@ def starting_scene(
 def choose_subject(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
     """Return ``settings`` with a subject, and the reason for it, which is empty if the subject was given.
 
-    Options that only fits know, as strokes, levels or a target PSNR, make any image a photograph. Line art
-    may be mixed.
+    Options that only fits know, as strokes, levels or a target PSNR, make any image a photograph.
     """
     if settings.subject != "auto":
         return settings, ""
     # A limit of bytes is for drawings too: they get fewer regions.
     fitted = settings.unsuited("drawing")
-    guess = guess_subject(target) if fitted in ([], ["mixed"]) else None
-    if guess is None or (fitted and guess.subject != "line"):
+    if fitted:
         return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
-    if settings.max_bytes and guess.subject not in {"photo", "drawing"}:
+    guess = guess_subject(target)
+    if settings.max_bytes and guess.subject == "pixel":
         return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
     return replace(settings, subject=guess.subject), guess.why

@@ -8,8 +8,9 @@ import pytest
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.corners import find_corners
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.ellipses import fit_ellipse
+from warpsplat.drawing.trace.ellipses import fit_ellipses
 from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.spans import Polyline
 
 
@@ -44,6 +45,10 @@ def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
     return pieces
 
 
+def count_corners(points: Floats) -> int:
+    return len(find_corners(Polylines.joined([points], [True])).along)
+
+
 @pytest.mark.parametrize("radius", [3.0, 12.0, 40.0])
 def test_a_circle_is_four_cubics(radius: float) -> None:
     points = ring(radius) + noise(200, 2)
@@ -57,9 +62,9 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
 def test_an_ellipse_is_four_cubics_the_way_round_that_it_was() -> None:
     points = ring(30, squeeze=0.5, turn=0.4)
     for way in (points, points[::-1]):
-        cubics = fit_ellipse(way, 0.2)
-        assert cubics is not None
-        shown = sampled(cubics)
+        is_ellipse, cubics = fit_ellipses([way], 0.2)
+        assert is_ellipse.all()
+        shown = sampled(cubics[0])
         nearest = np.hypot(*(shown[:, None] - points[None]).transpose(2, 0, 1)).min(axis=1)
         assert nearest.max() < 0.5  # half of the points' distance
         area = np.sum(shown[:-1, 0] * shown[1:, 1] - shown[1:, 0] * shown[:-1, 1])
@@ -68,7 +73,9 @@ def test_an_ellipse_is_four_cubics_the_way_round_that_it_was() -> None:
 
 
 def test_a_square_is_no_ellipse() -> None:
-    assert fit_ellipse(polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float)), 0.2) is None
+    square = polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float))
+    is_ellipse, cubics = fit_ellipses([square, ring(20), square[:4]], 0.2)
+    assert is_ellipse.tolist() == [False, True, False] and len(cubics) == 1
 
 
 def test_a_polygon_is_lines_between_its_corners() -> None:
@@ -103,14 +110,14 @@ def test_a_rounded_square_is_lines_and_arcs() -> None:
     pieces = fitted(np.concatenate(parts))
     assert pieces.lines.sum() == 4
     assert len(pieces.cubics) <= 10
-    assert find_corners(np.concatenate(parts), closed=True) == []
+    assert count_corners(np.concatenate(parts)) == 0
 
 
 def test_stairs_and_small_circles() -> None:
     """A circle of 3 px radius turns everywhere and has no corner; each step of a stair has one."""
-    assert find_corners(ring(3.0, 20), closed=True) == []
+    assert count_corners(ring(3.0, 20)) == 0
     stair = np.array([(0, 0), (8, 0), (8, 8), (16, 8), (16, 16), (0, 16)], float)
-    assert len(find_corners(polygon(stair), closed=True)) == 6
+    assert count_corners(polygon(stair)) == 6
 
 
 def test_open_runs_end_where_they_are_told_to() -> None:
@@ -122,3 +129,15 @@ def test_open_runs_end_where_they_are_told_to() -> None:
     assert len(pieces.cubics) <= 3
     shown = sampled(pieces.cubics, 200)
     assert np.hypot(*(points[:, None] - shown[None]).transpose(2, 0, 1)).min(axis=1).max() < 0.25
+
+
+def test_many_runs_are_fitted_as_each_alone() -> None:
+    rng = np.random.default_rng(1)
+    star = np.array([(0, 0), (9, 30), (40, 41), (10, 50), (1, 80), (-9, 50), (-40, 40), (-11, 30)], float)
+    runs = [Polyline(ring(9.0, 50, squeeze=0.7), closed=True), Polyline(polygon(star), closed=True)]
+    for count in (2, 9, 60):
+        points = np.cumsum(rng.normal(0, 1, (count, 2)), axis=0)
+        runs += [Polyline(points[1:-1], False, points[0], points[-1]), Polyline(points, closed=True)]
+    for alone, run in zip(fit_polylines(runs, 0.2), runs, strict=True):
+        (pieces,) = fit_polylines([run], 0.2)
+        assert np.allclose(pieces.cubics, alone.cubics, atol=1e-9) and (pieces.lines == alone.lines).all()

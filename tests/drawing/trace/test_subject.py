@@ -81,7 +81,7 @@ PICTURES = {
     "jpeg": (draw(BARS, 192, 192, jpeg=60), "drawing"),
     "ramp": (draw(ground("#eee") + RAMP), "drawing"),
     "one colour": (np.ones((64, 64, 3), np.float32), "drawing"),
-    "lines": (draw(LINES), "line"),
+    "lines": (draw(LINES), "drawing"),
     "photograph": (photograph(96), "photo"),
     "grainy logo": (grainy(draw(BARS, 192, 192)), "drawing"),
     "grainy photograph": (grainy(0.2 + 0.6 * photograph(192)), "photo"),

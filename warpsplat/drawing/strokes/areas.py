@@ -10,11 +10,12 @@ import numpy as np
 from warpsplat.drawing.strokes.blobs import BROAD, SMALLEST, pen_width
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, depth, dilated, eroded
-from warpsplat.drawing.trace.subject import LINE, LINE_SHARE
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray
 
+LINE, LINE_SHARE = 2.5, 0.006  # half the width of the broadest line [px], and over the longer side of
+# the image, if that is more
 NARROW = 1.6  # width down to which a part of an area belongs to it, over the width of the lines
 TIP = 3.0  # how far narrower corners and tips may reach, over the same; what reaches further is a line
 NEARBY = 15  # [px] side of the window whose mean colour is that of an area or of the paper

@@ -1,13 +1,17 @@
-"""Corners of a polyline of sub-pixel points, and where exactly they lie."""
+"""Corners of polylines of sub-pixel points, and where exactly they lie."""
 
 from __future__ import annotations
 
+import bisect
+from dataclasses import dataclass
+
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats
-from warpsplat.drawing.trace.polylines import arc_lengths, at_length
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.portable.elementary import arctan2, hypot
 from warpsplat.portable.linear import principal_direction
+from warpsplat.scene.scene import ranges
 
 SCALES = ((4.0, 28.0), (2.2, 50.0))
 """Lengths of outline on both sides that are compared [px], and the least turn of a corner [degrees], besides
@@ -15,130 +19,190 @@ what the outline turns beside it: a small circle turns everywhere.
 """
 
 LEAST_REACH = 1.2  # [px] of outline on each side, below which nothing is compared
+LEAST_POINTS = 5  # of a polyline with corners
 APART = 2.0  # [px] of outline between two corners, at the least
-
-Corner = tuple[float, Floats]
-"""The arc length where a corner lies, and its point."""
 
 ROUNDED = 1.1  # [px] of outline on each side of a corner that its antialiasing bends
 SIDE = 6.0  # [px] of outline on each side that tells where a corner is
+SIDE_SAMPLES = 9  # points of a side that tell its direction
+LEAST_SIDE = 1.5  # [px] of outline that has a direction
 MOST_OFF, MOST_OFF_SHORT = 4.0, 1.2  # [px] of a corner with long and short sides: the tips of stars are off
 BLUNT = 3.5  # [px] of outline between two corners that may be one
 MOST_OFF_BLUNT = 3.0  # [px] distance of that one from their middle, at the most
 
 
-def find_corners(points: Floats, closed: bool, scale: float = 1.0) -> list[Corner]:
-    """Return the corners of a polyline, in order along it.
+@dataclass(frozen=True)
+class Corners:
+    """Corners of polylines, by polyline and in order along each."""
+
+    owner: Ints
+    """The polyline that each is of, shape (corner,)."""
+    along: Floats
+    """The arc length where it lies, shape (corner,)."""
+    points: Floats
+    """Its point, shape (corner, 2)."""
+
+
+def find_corners(lines: Polylines, scale: float = 1.0) -> Corners:
+    """Return the corners of polylines.
 
     Args:
-        points: Shape (point, 2).
-        closed: Whether the last joins the first.
+        lines: Of sub-pixel points.
         scale: Factor of the lengths that are compared; larger for coarser outlines.
     """
-    along = arc_lengths(points, closed=closed)
-    total = float(along[-1])
-    here = along[: len(points)]
-    strength = np.zeros(len(points))
+    strength = np.zeros(len(lines.points))
     for length, least in SCALES:
-        reach = min(length * scale, total / 6)
-        if reach < LEAST_REACH:
-            continue
-        before, turn, after = _turns(points, along, closed, here, reach)
+        reach = np.minimum(length * scale, lines.totals / 6)
+        compared = np.flatnonzero((reach >= LEAST_REACH) & (lines.counts >= LEAST_POINTS))
+        which = np.repeat(compared, lines.counts[compared])
+        index = ranges(lines.first[compared], lines.counts[compared])
+        here, reach = lines.along[index], reach[which]
+        before, turn, after = _turns(lines, which, here, reach)
         sign = np.sign(turn)
         # The next corner of a staircase turns the other way.
         excess = np.abs(turn) - 0.5 * (np.maximum(sign * before, 0) + np.maximum(sign * after, 0))
-        if not closed:
-            excess[(here < reach * 0.6) | (here > total - reach * 0.6)] = 0
-        strength = np.maximum(strength, excess / least)
-    corners = _located(points, along, closed, _peaks(strength, here, total, closed))
-    return _with_sharp_tips(points, along, closed, corners)
+        at_end = (here < reach * 0.6) | (here > lines.totals[which] - reach * 0.6)
+        excess[at_end & ~lines.closed[which]] = 0
+        strength[index] = np.maximum(strength[index], excess / least)
+    return _with_sharp_tips(lines, _located(lines, _peaks(lines, strength)))
 
 
-def _turns(points: Floats, along: Floats, closed: bool, where: Floats, reach: float) -> Floats:
-    """Return the degrees that the polyline turns ``reach`` before arc lengths, there and after, (3, n)."""
-    x, y = np.moveaxis(at_length(points, along, closed, where + reach * np.arange(-2, 3)[:, None]), 2, 0)
+def _turns(lines: Polylines, which: Ints, where: Floats, reach: Floats) -> Floats:
+    """Return the degrees that polylines turn ``reach`` before arc lengths, there and after, (3, n)."""
+    x, y = np.stack([lines.at(which, where + reach * step) for step in range(-2, 3)]).transpose(2, 0, 1)
     x, y = np.diff(x, axis=0), np.diff(y, axis=0)
     cross, dot = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
     return np.asarray(np.degrees(arctan2(cross, dot)))
 
 
-def _peaks(strength: Floats, here: Floats, total: float, closed: bool) -> list[int]:
-    """Return the strongest points, none of them close to a stronger one."""
-    found: list[int] = []
+def _peaks(lines: Polylines, strength: Floats) -> Ints:
+    """Return the strongest points, none of them close to a stronger one of its polyline, in order."""
     candidates = np.flatnonzero(strength >= 1)
-    for i in candidates[np.argsort(-strength[candidates], kind="stable")].tolist():
-        gaps = np.abs(here[found] - here[i])
-        if closed:
-            gaps = np.minimum(gaps, total - gaps)
-        if not len(gaps) or gaps.min() > APART:
-            found.append(i)
-    return sorted(found)
+    owner = np.searchsorted(lines.first, candidates, side="right") - 1
+    order = np.lexsort((-strength[candidates], owner))
+    candidates, owner = candidates[order], owner[order]
+    found: list[int] = []
+    kept: list[float] = []  # where corners were found on the ``last`` polyline
+    last, around = -1, 0.0
+    places = zip(candidates.tolist(), owner.tolist(), lines.along[candidates].tolist(), strict=True)
+    for candidate, polyline, here in places:
+        if polyline != last:
+            last, kept = polyline, []
+            around = float(lines.totals[polyline]) if lines.closed[polyline] else np.inf
+        place = bisect.bisect(kept, here)
+        before = kept[place - 1] if place else (kept[-1] - around if kept else -np.inf)
+        after = kept[place] if place < len(kept) else (kept[0] + around if kept else np.inf)
+        if here - before > APART and after - here > APART:
+            kept.insert(place, here)
+            found.append(candidate)
+    return np.asarray(sorted(found), np.intp)
 
 
-def _located(points: Floats, along: Floats, closed: bool, corners: list[int]) -> list[Corner]:
+def _located(lines: Polylines, peaks: Ints) -> Corners:
     """Return corners where their two sides meet."""
-    total = float(along[-1])
-    where = [float(along[i]) for i in corners]
-    if closed:
-        around = [where[-1] - total, *where, where[0] + total] if where else []
-    else:
-        around = [-ROUNDED, *where, total + ROUNDED]
-    result = []
-    for number, i in enumerate(corners):
-        before, here, after = around[number : number + 3]
-        low, high = max(here - SIDE, before + ROUNDED), min(here + SIDE, after - ROUNDED)
-        point = _meeting(
-            _side(points, along, closed, low, here - ROUNDED),
-            _side(points, along, closed, here + ROUNDED, high),
-            points[i],
-            MOST_OFF if min(here - low, high - here) > 0.6 * SIDE else MOST_OFF_SHORT,
-        )
-        result.append((here, point))
-    return result
+    owner, here = np.searchsorted(lines.first, peaks, side="right") - 1, lines.along[peaks]
+    total, closed = lines.totals[owner], lines.closed[owner]
+    before, after = _neighbours(owner)
+    # Before the first corner of a closed polyline lies the last, and beyond an open one nothing.
+    beyond = np.where(closed, here[before] - total, -ROUNDED)
+    low = np.where(before < np.arange(len(peaks)), here[before], beyond)
+    beyond = np.where(closed, here[after] + total, total + ROUNDED)
+    high = np.where(after > np.arange(len(peaks)), here[after], beyond)
+    low, high = np.maximum(here - SIDE, low + ROUNDED), np.minimum(here + SIDE, high - ROUNDED)
+    is_long = np.minimum(here - low, high - here) > 0.6 * SIDE
+    points, _ = _meetings(
+        _sides(lines, owner, low, here - ROUNDED),
+        _sides(lines, owner, here + ROUNDED, high),
+        lines.points[peaks],
+        np.where(is_long, MOST_OFF, MOST_OFF_SHORT),
+    )
+    return Corners(owner, here, points)
 
 
-def _with_sharp_tips(points: Floats, along: Floats, closed: bool, corners: list[Corner]) -> list[Corner]:
+def _neighbours(owner: Ints) -> tuple[Ints, Ints]:
+    """Return the corners before and after each one, around its polyline."""
+    number, changes = np.arange(len(owner)), np.diff(owner) != 0
+    is_first, is_last = np.append(True, changes)[: len(owner)], np.append(changes, True)[: len(owner)]
+    before, after = number - 1, number + 1
+    before[is_first], after[is_last] = number[is_last], number[is_first]
+    return before, after
+
+
+def _with_sharp_tips(lines: Polylines, corners: Corners) -> Corners:
     """Return corners with one for each two that antialiasing made of it: their outer sides meet near them."""
-    total = float(along[-1])
-    result = list(corners)
-    number = 0
-    while number < len(result) - (not closed) and len(result) > 2:
-        after = (number + 1) % len(result)
-        low, high = result[number][0], result[after][0] + (total if after < number + 1 else 0.0)
-        if high - low < BLUNT:
-            before, beyond = low - SIDE, high + SIDE
-            if not closed:
-                before, beyond = max(before, 0.0), min(beyond, total)
-            middle = at_length(points, along, closed, np.array([(low + high) / 2]))[0]
-            one = _side(points, along, closed, before, low - 0.5)
-            point = _meeting(one, _side(points, along, closed, high + 0.5, beyond), middle, MOST_OFF_BLUNT)
-            if point is not middle:
-                result[number] = ((low + high) / 2 % total if closed else (low + high) / 2, point)
-                del result[after]
-                continue
-        number += 1
-    return sorted(result, key=lambda corner: corner[0])
+    while len(corners.owner):
+        owner, along, points = corners.owner, corners.along.copy(), corners.points.copy()
+        after = _neighbours(owner)[1]
+        wraps = after <= np.arange(len(owner))
+        total, closed = lines.totals[owner], lines.closed[owner]
+        left = np.bincount(owner)
+        near = (along[after] + wraps * total - along < BLUNT) & (closed | ~wraps) & (left[owner] > 2)
+        pairs = np.flatnonzero(near)
+        low, high = along[pairs], along[after[pairs]] + (wraps * total)[pairs]
+        met, middle, tips = _tips(lines, owner[pairs], low, high)
+        gone, taken = np.zeros(len(owner), np.bool_), np.zeros(len(owner), np.bool_)
+        for number in np.flatnonzero(met).tolist():
+            one, other = int(pairs[number]), int(after[pairs[number]])
+            if not (taken[one] or taken[other] or left[owner[one]] <= 2):
+                taken[[one, other]], gone[other] = True, True
+                along[one], points[one] = middle[number], tips[number]
+                left[owner[one]] -= 1
+        if not gone.any():
+            break
+        order = np.lexsort((along, owner))
+        order = order[~gone[order]]
+        corners = Corners(owner[order], along[order], points[order])
+    return corners
 
 
-def _side(
-    points: Floats, along: Floats, closed: bool, low: float, high: float
-) -> tuple[Floats, Floats] | None:
-    """Return a point of a side and its direction; None where it is too short."""
-    if high - low < 1.5:
-        return None
-    part = at_length(points, along, closed, np.linspace(low, high, 9))
-    return part.mean(axis=0), principal_direction(part)
+def _tips(lines: Polylines, owner: Ints, low: Floats, high: Floats) -> tuple[Bools, Floats, Floats]:
+    """Return whether what is outside of two corners meets near their middle, that arc length, and where."""
+    total, closed = lines.totals[owner], lines.closed[owner]
+    before = np.where(closed, low - SIDE, np.maximum(low - SIDE, 0))
+    beyond = np.where(closed, high + SIDE, np.minimum(high + SIDE, total))
+    middle = (low + high) / 2
+    points, met = _meetings(
+        _sides(lines, owner, before, low - 0.5),
+        _sides(lines, owner, high + 0.5, beyond),
+        lines.at(owner, middle),
+        np.full(len(owner), MOST_OFF_BLUNT),
+    )
+    return met, np.where(closed, middle % np.where(closed, total, 1), middle), points
 
 
-def _meeting(
-    one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | None, near: Floats, far: float
-) -> Floats:
-    """Return where two sides meet; ``near`` where they do not, or farther away from it than ``far`` [px]."""
-    if one is None or other is None:
-        return near
-    (x, y), (other_x, other_y), (away_x, away_y) = one[1], other[1], other[0] - one[0]
+@dataclass(frozen=True)
+class _Sides:
+    """Straight parts of outline beside corners."""
+
+    middles: Floats
+    """Shape (side, 2)."""
+    directions: Floats
+    """Unit vectors, shape (side, 2)."""
+    known: Bools
+    """Whether they are long enough, shape (side,)."""
+
+
+def _sides(lines: Polylines, owner: Ints, low: Floats, high: Floats) -> _Sides:
+    """Return the sides between arc lengths, shape (side,) each."""
+    where = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, SIDE_SAMPLES)
+    points = lines.at(np.repeat(owner, SIDE_SAMPLES), where.reshape(-1)).reshape(-1, SIDE_SAMPLES, 2)
+    return _Sides(points.mean(axis=1), principal_direction(points), high - low >= LEAST_SIDE)
+
+
+def _meetings(one: _Sides, other: _Sides, near: Floats, far: Floats) -> tuple[Floats, Bools]:
+    """Return where sides meet, and whether they do; ``near`` where not, or farther away from it than ``far``.
+
+    Args:
+        one: Sides before corners.
+        other: Those after.
+        near: Shape (corner, 2).
+        far: [px], shape (corner,).
+    """
+    (x, y), (other_x, other_y) = one.directions.T, other.directions.T
+    away_x, away_y = (other.middles - one.middles).T
     cross = x * other_y - y * other_x
-    if abs(cross) < 0.2:
-        return near
-    point = one[0] + (away_x * other_y - away_y * other_x) / cross * one[1]
-    return np.asarray(point if hypot(*(point - near)) <= far else near)
+    met = one.known & other.known & (np.abs(cross) >= 0.2)
+    along = (away_x * other_y - away_y * other_x) / np.where(met, cross, 1)
+    points = one.middles + along[:, None] * one.directions
+    met &= hypot(*(points - near).T) <= far
+    return np.where(met[:, None], points, near), met

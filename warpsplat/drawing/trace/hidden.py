@@ -1,9 +1,8 @@
-"""The cover of a region, which hides parts of it, and the shortest paths under it."""
+"""The cover of regions, which hides parts of them, and the shortest paths under it."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -11,11 +10,14 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, eroded
 from warpsplat.portable.elementary import hypot
+from warpsplat.scene.scene import ranges
 
 NEAREST, DEEPEST, DEPTH_STEP = 0.5, 16.0, 0.5
 """How far beyond its boundary what hides a region is measured: first, at the most, and between [px]."""
 
 MARGIN = 0.7  # [px] between a hidden line and where it would be seen
+SHORT = 1.5  # [px] of a line that needs no cover
+LONG = 1e5  # [px] of all lines that are looked at together, which bounds the memory
 CUT_OFF = 1.0  # [px squared] area of its region that a hidden outline may cut off
 
 
@@ -26,26 +28,35 @@ class Cover:
     ranks: Ints
     """Rank of what is painted at each pixel, -1 where that hides nothing; shape (height, width)."""
 
-    def hides(self, rank: int, points: Floats) -> Bools:
-        """Return whether a region of this rank is hidden at points, shape (point, 2); outside, all is."""
+    def hides(self, rank: Ints, points: Floats) -> Bools:
+        """Return whether regions of these ranks are hidden at points, shape (point, 2); outside, all are."""
         height, width = self.ranks.shape
-        cell = np.floor(points).astype(np.intp)
-        outside = ((cell < 0) | (cell >= [width, height])).any(axis=1)
-        return outside | (
-            self.ranks[np.clip(cell[:, 1], 0, height - 1), np.clip(cell[:, 0], 0, width - 1)] > rank
-        )
+        x, y = np.floor(points).astype(np.intp).T
+        outside = (x < 0) | (x >= width) | (y < 0) | (y >= height)
+        return outside | (self.ranks[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)] > rank)
 
-    def hides_line(self, rank: int, start: Floats, end: Floats) -> bool:
-        """Return whether a straight line with a margin is hidden, its ends aside."""
+    def hides_lines(self, rank: Ints, start: Floats, end: Floats) -> Bools:
+        """Return whether straight lines with a margin are hidden, their ends aside; shape (line,)."""
         vector = end - start
-        size = float(hypot(*vector))
-        if size < 1.5:
-            return True
-        unit = vector / size
-        normal = MARGIN * np.array([-unit[1], unit[0]])
-        points = start + np.arange(0.75, size - 0.5, 0.5)[:, None] * unit
-        beside = [points, points[1:-1] + normal, points[1:-1] - normal]
-        return bool(self.hides(rank, np.concatenate(beside)).all())
+        size = hypot(*vector.T)
+        half = len(size) // 2
+        if half and size.sum() > LONG:
+            parts = (slice(None, half), slice(half, None))
+            return np.concatenate([self.hides_lines(rank[part], start[part], end[part]) for part in parts])
+        hidden = size < SHORT
+        lines = np.flatnonzero(~hidden)
+        unit = vector[lines] / size[lines, None]
+        counts = np.ceil((size[lines] - 1.25) / 0.5).astype(np.intp)
+        line, number = np.repeat(np.arange(len(lines)), counts), ranges(np.zeros_like(counts), counts)
+        points = start[lines][line] + (0.75 + 0.5 * number)[:, None] * unit[line]
+        normal = MARGIN * np.stack([-unit[:, 1], unit[:, 0]], axis=1)[line]
+        ranks = rank[lines][line]
+        is_inner = (number > 0) & (number < counts[line] - 1)
+        seen = ~self.hides(ranks, points)
+        for beside in (normal, -normal):
+            seen |= is_inner & ~self.hides(ranks, points + beside)
+        hidden[lines] = np.bincount(line, seen, len(lines)) == 0
+        return hidden
 
     def hides_polygon(self, rank: int, polygon: Floats) -> bool:
         """Return whether all of a polygon is hidden, pixels on its edge aside."""
@@ -54,13 +65,14 @@ class Cover:
         mask = np.zeros((height, width), np.uint8)
         cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
         rows, columns = np.nonzero(eroded(mask, 3))
-        return bool(self.hides(rank, np.stack([columns, rows], axis=1) + low + 0.5).all())
+        inside = np.stack([columns, rows], axis=1) + low + 0.5
+        return bool(self.hides(np.full(len(inside), rank), inside).all())
 
-    def middles(self, rank: int, begins: Ints, steps: Ints, trends: Floats) -> Floats:
+    def middles(self, rank: Ints, begins: Ints, steps: Ints, trends: Floats) -> Floats:
         """Return points beyond cracks, halfway through what hides a region there, shape (crack, 2).
 
         Args:
-            rank: Of the region.
+            rank: Of the regions, shape (crack,).
             begins: Where the cracks begin, shape (crack, 2).
             steps: Their directions, shape (crack, 2).
             trends: Directions of the outline, shape (crack, 2).
@@ -69,56 +81,81 @@ class Cover:
         trends = np.where(np.abs(trends).max(axis=1, keepdims=True) > 0, trends, steps)
         outward = np.stack([trends[:, 1], -trends[:, 0]], axis=1) / hypot(*trends.T)[:, None]
         middle = begins + 0.5 * steps
-        reach, is_hidden = np.full(len(begins), NEAREST), np.ones(len(begins), np.bool_)
+        reach, open_ = np.full(len(begins), NEAREST), np.arange(len(begins))
         for depth in np.arange(NEAREST, DEEPEST, DEPTH_STEP):
-            is_hidden &= self.hides(rank, middle + depth * outward)
-            reach[is_hidden] = depth
+            open_ = open_[self.hides(rank[open_], middle[open_] + depth * outward[open_])]
+            reach[open_] = depth
         near = middle + NEAREST * np.stack([steps[:, 1], -steps[:, 0]], axis=1)
         return np.where(reach[:, None] > NEAREST, middle + 0.5 * reach[:, None] * outward, near)
 
 
-def shortest_path(cover: Cover, rank: int, goals: Floats, vertices: Floats, *, through_holes: bool) -> Floats:
-    """Return the corners of a path from the first to the last goal, hidden from a region of this rank.
+@dataclass(frozen=True)
+class HiddenPaths:
+    """The shortest paths under a cover, found for all at once."""
 
-    Args:
-        cover: What hides the region.
-        rank: Of the region.
-        goals: Its ends and, beyond each crack between, a hidden point; shape (crack + 2, 2).
-        vertices: Of the region's boundary, one more than there are cracks, the last one twice; shape
-            (crack + 2, 2).
-        through_holes: Whether what is above has holes, through which the path must not be seen.
-    """
-    cross = vertices[:-1, 0] * vertices[1:, 1] - vertices[:-1, 1] * vertices[1:, 0]
-    swept = np.concatenate([[0.0], np.cumsum(cross)])
+    cover: Cover
+    rank: Ints
+    """Of the region that each path is hidden from, shape (path,)."""
+    has_holes: bool
+    """Whether what is above may have holes, through which a path must not be seen."""
+    first: Ints
+    """First goal of each path and, last, the number of goals, shape (path + 1,)."""
+    goals: Floats
+    """Ends of paths and, beyond each crack between, a hidden point; shape (goal, 2)."""
+    vertices: Floats
+    """The region's boundary, a vertex before each crack, and the last one three times; shape (goal, 2)."""
 
-    def is_free(i: int, j: int) -> bool:
-        """Return whether the path may go straight from goal i to goal j."""
+    def corners(self) -> list[Floats]:
+        """Return the corners of each path between its first and its last goal, shape (corner, 2)."""
+        cross = self.vertices[:-1, 0] * self.vertices[1:, 1] - self.vertices[1:, 0] * self.vertices[:-1, 1]
+        swept = np.concatenate([[0.0], np.cumsum(cross)])
+        path, at, last = np.arange(len(self.rank)), self.first[:-1].copy(), self.first[1:] - 1
+        is_corner = np.zeros(len(self.goals), np.bool_)
+        while len(path):
+            at = self._furthest(swept, path, at, last[path])
+            is_corner[at] = True
+            going = at < last[path]
+            path, at = path[going], at[going]
+        is_corner[last] = False
+        parts = np.split(
+            np.flatnonzero(is_corner), np.searchsorted(np.flatnonzero(is_corner), self.first[1:-1])
+        )
+        return [self.goals[part] for part in parts]
+
+    def _furthest(self, swept: Floats, path: Ints, at: Ints, last: Ints) -> Ints:
+        """Return the last goals reached from goals ``at`` in straight lines, by a galloping search."""
+        best = np.where(self._are_free(swept, path, at, last), last, at + 1)
+        high = best.copy()  # not reached, where it is more than the best one
+        open_, step = np.flatnonzero(best < last), 1
+        while len(open_):
+            goal = at[open_] + step
+            in_reach = goal < last[open_]
+            high[open_[~in_reach]] = last[open_[~in_reach]]
+            open_, goal = open_[in_reach], goal[in_reach]
+            free = self._are_free(swept, path[open_], at[open_], goal)
+            best[open_[free]] = goal[free]
+            high[open_[~free]] = goal[~free]
+            open_, step = open_[free], 2 * step
+        open_ = np.flatnonzero(high - best > 1)
+        while len(open_):
+            middle = (best[open_] + high[open_]) // 2
+            free = self._are_free(swept, path[open_], at[open_], middle)
+            best[open_[free]], high[open_[~free]] = middle[free], middle[~free]
+            open_ = open_[high[open_] - best[open_] > 1]
+        return best
+
+    def _are_free(self, swept: Floats, path: Ints, i: Ints, j: Ints) -> Bools:
+        """Return whether paths may go straight from goals i to goals j."""
         # Cutting short must not cut off the region itself, which lies on the right.
-        corners = vertices[j], goals[j], goals[i], vertices[i]
-        beside = swept[j] - swept[i] + sum(a[0] * b[1] - a[1] * b[0] for a, b in itertools.pairwise(corners))
-        if beside > 2 * CUT_OFF or not cover.hides_line(rank, goals[i], goals[j]):
-            return False
-        if not through_holes:
-            return True
-        return cover.hides_polygon(rank, np.concatenate([vertices[i : j + 1], goals[[j, i]]]))
-
-    at, found = 0, []
-    while at < len(goals) - 1:
-        at = _furthest(is_free, at, len(goals) - 1)
-        found.append(goals[at])
-    return np.asarray(found[:-1]).reshape(-1, 2)
-
-
-def _furthest(is_free: Callable[[int, int], bool], at: int, last: int) -> int:
-    """Return the last goal after ``at`` that is reached in a straight line, found by a galloping search."""
-    if is_free(at, last):
-        return last
-    reach, best = 1, at + 1
-    while at + reach < last and is_free(at, at + reach):
-        best = at + reach
-        reach *= 2
-    low, high = best, min(at + reach, last)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if is_free(at, middle) else (low, middle)
-    return low
+        corners = self.vertices[j], self.goals[j], self.goals[i], self.vertices[i]
+        beside = swept[j] - swept[i]
+        for a, b in itertools.pairwise(corners):
+            beside = beside + a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        free = beside <= 2 * CUT_OFF
+        kept = np.flatnonzero(free)
+        free[kept] = self.cover.hides_lines(self.rank[path[kept]], self.goals[i[kept]], self.goals[j[kept]])
+        for number in np.flatnonzero(free & self.has_holes).tolist():
+            low, high = int(i[number]), int(j[number])
+            polygon = np.concatenate([self.vertices[low : high + 1], self.goals[[high, low]]])
+            free[number] = self.cover.hides_polygon(int(self.rank[path[number]]), polygon)
+        return free

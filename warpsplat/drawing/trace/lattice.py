@@ -12,7 +12,7 @@ from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.portable import elementary
 
 SAMPLES = 1024
-"""Most rows and columns, from the middle of an image, that a period is looked for in."""
+"""Most rows and columns [px], from the middle of an image, that a period is looked for in."""
 
 TURN = 4096
 """Steps of a turn: periods are sought among ``TURN`` / whole numbers."""
@@ -73,7 +73,7 @@ class Axis(NamedTuple):
     """[px]"""
 
     def borders(self, size: int) -> Floats:
-        """Return the lines between 0 and ``size`` [px], and these."""
+        """Return 0, the lines between 0 and ``size``, and ``size`` [px]."""
         first = self.origin % self.period
         lines = first + self.period * np.arange(np.ceil((size - first) / self.period))
         # A cell of less than half a pixel at the border has no pixel of its own.
@@ -205,11 +205,11 @@ def _with_colors(levels: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Latt
     error, variance = np.square(levels - shown(colors)), np.square(levels - levels.mean(axis=(0, 1)))
     if error.sum() > (1 - (EXPLAINED_SOFT if soft else EXPLAINED)) * variance.sum():
         return None
-    found = _few_colors(colors, NOISES * float(np.sqrt(np.median(error))))
+    found = _numbered(colors, NOISES * float(np.sqrt(np.median(error))))
     return Lattice(columns, rows, *found) if found else None
 
 
-def _few_colors(colors: Floats, noise: float) -> tuple[Ints, Ints] | None:
+def _numbered(colors: Floats, noise: float) -> tuple[Ints, Ints] | None:
     """Return the number of each cell's colour, and the colours; None if there are more than ``MOST_COLORS``.
 
     ``noise``: largest difference of a cell from its colour [levels].

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.corners import find_corners
+from warpsplat.drawing.trace.corners import Corners, find_corners
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
-from warpsplat.drawing.trace.polylines import arc_lengths
+from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.portable.elementary import hypot
+from warpsplat.scene.scene import ranges, starts_of
 
 FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest scale
 BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
@@ -18,6 +19,7 @@ SPACING, MOST_KNOTS = 1.5, 48  # [px] between knots, about; and how many a span 
 WINDOW = 4.0  # [px] of outline on each side of a knot that tells its place and tangent
 END_WEIGHT = 16.0  # of a corner or junction, which is known exactly
 RANK = 1e-24  # what is left of a sum of squares, over the whole, that counts as 0
+CHUNK = 8192  # knots that are smoothed at once, which bounds the memory
 
 
 @dataclass(frozen=True)
@@ -33,139 +35,196 @@ class Polyline:
     is_polygon: bool = False
     """Whether the points are corners."""
 
+    def with_ends(self) -> Floats:
+        """Return the points and, of an open one, its ends; none of them twice in a row."""
+        if self.closed:
+            return self.points
+        assert self.start is not None and self.end is not None
+        points = np.concatenate([self.start[None], self.points, self.end[None]])
+        keep = np.concatenate([[True], hypot(*np.diff(points, axis=0).T) > 1e-6])
+        return np.asarray(points[keep] if keep.sum() > 1 else points[:2])
+
 
 @dataclass(frozen=True)
-class Span:
-    """A part of a run between two corners, or a smooth ring."""
+class Spans:
+    """Parts of runs between two corners, or smooth rings, one after the other."""
 
+    owner: Ints
+    """The run that each is a part of, shape (span,)."""
     points: Floats
-    """Shape (point, 2); of a ring the last is the first."""
+    """Of all, shape (point, 2)."""
+    first: Ints
+    """First knot of each and, last, the number of knots, shape (span + 1,)."""
     knots: Floats
     """Where one curve may end and the next begin, shape (knot, 2)."""
     tangents: Floats
     """Unit vectors there, shape (knot, 2)."""
     places: Ints
-    """Index of the point at each knot, shape (knot,)."""
+    """Number of the point at each knot, shape (knot,)."""
 
 
-def cut_at_corners(run: Polyline, tolerance: float) -> list[Span]:
-    """Return the spans of a run.
+def cut_at_corners(runs: Sequence[Polyline], tolerance: float) -> Spans:
+    """Return the spans of runs, in order along each; smooth rings come last.
 
     Args:
-        run: No polygon.
+        runs: No polygons.
         tolerance: Of the curves that are to be fitted [px]; for coarser ones corners are broader.
     """
-    points = run.points
-    if not run.closed:
-        assert run.start is not None and run.end is not None
-        points = np.concatenate([run.start[None], points, run.end[None]])
-        keep = np.concatenate([[True], hypot(*np.diff(points, axis=0).T) > 1e-6])
-        points = points[keep] if keep.sum() > 1 else points[:2]
-    scale = max(1.0, tolerance / FINE_TOLERANCE)
-    corners = find_corners(points, run.closed, scale) if len(points) > 4 else []
-    if run.closed and not corners:
-        ring = np.roll(points, -int(points[:, 0].argmin()), axis=0)  # begun where it goes straight up or down
-        return [_with_knots(np.concatenate([ring, ring[:1]]), closed=True)]
-    along = arc_lengths(points, closed=run.closed)
-    total = float(along[-1])
-    if run.closed:
-        stops = [*corners, (corners[0][0] + total, corners[0][1])]
-        along = np.concatenate([along[:-1], along[:-1] + total])
-        points = np.concatenate([points, points])
-    else:
-        stops = [(0.0, points[0]), *corners, (total, points[-1])]
-    spans = []
-    for (low, first), (high, last) in itertools.pairwise(stops):
-        after = BENT if run.closed or low > 0 else 1e-6
-        before = BENT if run.closed or high < total else 1e-6
-        inner = points[(along > low + after) & (along < high - before)]
-        spans.append(_with_knots(np.concatenate([first[None], inner, last[None]])))
-    return spans
+    lines = Polylines.joined([run.with_ends() for run in runs], [run.closed for run in runs])
+    corners = find_corners(lines, max(1.0, tolerance / FINE_TOLERANCE))
+    owner, parts = _cut(lines, corners)
+    smooth = np.flatnonzero(lines.closed & (np.bincount(corners.owner, minlength=len(lines)) == 0))
+    points = [runs[ring].points for ring in smooth.tolist()]
+    # Begun where they go straight up or down.
+    begun = [np.roll(ring, -int(ring[:, 0].argmin()), axis=0) for ring in points]
+    rings = Polylines.joined(begun, [True] * len(begun))
+    return _with_knots(np.concatenate([owner, smooth]), parts.and_also(rings))
 
 
-def _with_knots(points: Floats, closed: bool = False) -> Span:
-    """Return the span of points, of which a ring's last is its first."""
-    along = arc_lengths(points)
-    total = float(along[-1])
-    wanted = np.linspace(0, total, int(np.clip(total / SPACING, 1, MOST_KNOTS)) + 1)
-    right = np.clip(np.searchsorted(along, wanted), 1, len(along) - 1)
-    places = np.unique(right - (wanted - along[right - 1] < along[right] - wanted))
-    if len(places) < 2:
-        places = np.array([0, len(points) - 1])
-    knots, tangents = _smoothed(points[:-1] if closed else points, along, places, closed)
-    if closed:
-        knots[-1], tangents[-1] = knots[0], tangents[0]
-    else:
-        knots[0], knots[-1] = points[0], points[-1]
-    return Span(points, knots, tangents, places)
+def _cut(lines: Polylines, corners: Corners) -> tuple[Ints, Polylines]:
+    """Return the parts of polylines between corners, and the polyline that each is of."""
+    has_corner = np.bincount(corners.owner, minlength=len(lines)) > 0
+    opened, closed = np.flatnonzero(~lines.closed), np.flatnonzero(lines.closed & has_corner)
+    begin, end = lines.first[opened], lines.first[opened + 1] - 1
+    # A closed one begins at its first corner and ends there again.
+    again = np.searchsorted(corners.owner, closed)
+    owner = np.concatenate([opened, corners.owner, opened, closed])
+    beyond = corners.along[again] + lines.totals[closed]
+    along = np.concatenate([lines.along[begin], corners.along, lines.along[end], beyond])
+    stops = np.concatenate([lines.points[begin], corners.points, lines.points[end], corners.points[again]])
+    bent = np.repeat([1e-6, BENT, 1e-6, BENT], [len(opened), len(corners.owner), len(opened), len(closed)])
+    order = np.lexsort((along, owner))
+    owner, along, stops, bent = owner[order], along[order], stops[order], bent[order]
+    cut = np.flatnonzero(owner[1:] == owner[:-1])
+    inner, counts = _between(lines, owner[cut], (along + bent)[cut], (along - bent)[cut + 1])
+    first = starts_of(counts + 2)
+    points = np.empty((first[-1], 2))
+    points[first[:-1]], points[first[1:] - 1] = stops[cut], stops[cut + 1]
+    points[ranges(first[:-1] + 1, counts)] = lines.points[inner]
+    return owner[cut], Polylines.of(points, first, np.zeros(len(cut), np.bool_))
 
 
-def _smoothed(ring: Floats, along: Floats, places: Ints, closed: bool) -> tuple[Floats, Floats]:
-    """Return where an outline passes at ``places``, and its directions, by parabolas through points nearby.
+def _between(lines: Polylines, which: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+    """Return the numbers of the points between pairs of arc lengths, and how many points each pair has.
+
+    Closed polylines go on after their length.
+    """
+    count, total = lines.counts[which], lines.totals[which]
+
+    def until(where: Floats) -> Ints:
+        turns = np.where(lines.closed[which], np.floor(where / np.maximum(total, 1e-9)), 0)
+        rest = np.clip(where - turns * total, 0, total)
+        return turns.astype(np.intp) * count + np.minimum(lines.points_until(which, rest), count)
+
+    begin = until(low)
+    counts = np.maximum(until(np.nextafter(high, -np.inf)) - begin, 0)
+    owner = np.repeat(np.arange(len(which)), counts)
+    return lines.first[which][owner] + ranges(begin, counts) % count[owner], counts
+
+
+def _with_knots(owner: Ints, parts: Polylines) -> Spans:
+    """Return spans of the points of ``parts``, of runs ``owner``."""
+    counts = np.clip(parts.totals / SPACING, 1, MOST_KNOTS).astype(np.intp)
+    span, number = np.repeat(np.arange(len(parts)), counts + 1), ranges(np.zeros_like(counts), counts + 1)
+    first, last = parts.first[:-1][span], parts.first[1:][span] - 1
+    wanted = number * (parts.totals / counts)[span]
+    right = first + np.clip(parts.points_until(span, wanted), 1, last - first)
+    places = right - (wanted - parts.along[right - 1] < parts.along[right] - wanted)
+    places = np.where(number == 0, first, np.where(number == counts[span], last, places))
+    is_new = np.append(True, np.diff(places) != 0)[: len(places)]
+    span, places = span[is_new], places[is_new]
+    around = _three_times_around(parts)
+    smoothed = [
+        _smoothed(parts, around, span[i : i + CHUNK], places[i : i + CHUNK])
+        for i in range(0, max(len(span), 1), CHUNK)
+    ]
+    knots, tangents = (np.concatenate(part) for part in zip(*smoothed, strict=True))
+    starts = np.searchsorted(span, np.arange(len(parts) + 1))
+    begin, end = starts[:-1], starts[1:] - 1
+    knots[begin] = np.where(parts.closed[:, None], knots[begin], parts.points[places[begin]])
+    knots[end] = np.where(parts.closed[:, None], knots[begin], parts.points[places[end]])
+    tangents[end] = np.where(parts.closed[:, None], tangents[begin], tangents[end])
+    return Spans(owner, parts.points, starts, knots, tangents, places)
+
+
+def _three_times_around(lines: Polylines) -> Polylines:
+    """Return polylines in which closed ones go around three times."""
+    times = np.where(lines.closed, 3, 1)
+    counts = times * lines.counts
+    owner, number = np.repeat(np.arange(len(lines)), counts), ranges(np.zeros_like(counts), counts)
+    index = lines.first[owner] + number % lines.counts[owner]
+    along = lines.along[index] + number // lines.counts[owner] * lines.totals[owner]
+    return Polylines(lines.points[index], starts_of(counts), np.zeros(len(lines), np.bool_), along)
+
+
+def _smoothed(lines: Polylines, around: Polylines, which: Ints, places: Ints) -> tuple[Floats, Floats]:
+    """Return where outlines pass at some points, and their directions, by parabolas through those nearby.
 
     Args:
-        ring: Points, shape (point, 2).
-        along: Their arc lengths; of a closed outline with its length at last.
-        places: Indices of points.
-        closed: Whether the last point joins the first.
+        lines: The outlines.
+        around: The same three times around.
+        which: Numbers of outlines, shape (place,).
+        places: Numbers of points of ``lines``, shape (place,).
     """
-    total, here, count = float(along[-1]), along[places], len(ring)
-    along = along[:count]
-    window, first = WINDOW, 0
-    weights = np.where((along == 0) | (along == total), END_WEIGHT, 1.0)
-    if closed:
-        window, first, weights = min(WINDOW, 0.5 * total), count, np.ones(count)
-        along = np.concatenate([along - total, along, along + total])
-    beside = np.arange(min(5, len(along))) + np.clip(places[:, None] + first - 2, 0, max(len(along) - 5, 0))
-    third = np.sort(np.abs(along[beside] - here[:, None]), axis=1)[:, min(2, len(along) - 1)]
-    reach = np.maximum(window, third + 1e-9)  # so that rounding does not leave the third out
-    low, high = np.searchsorted(along, here - reach), np.searchsorted(along, here + reach, side="right")
-    counts = np.minimum(high - low, count)
+    total, closed, count = lines.totals[which], lines.closed[which], lines.counts[which]
+    first, last = around.first[which], around.first[which + 1] - 1
+    turn, here = closed * count, lines.along[places] + closed * total
+    window = np.where(closed, np.minimum(WINDOW, 0.5 * total), WINDOW)
+    middle = first + turn + places - lines.first[which]
+    # The third of the nearest points is within reach.
+    beside = np.clip(middle - 2, first, np.maximum(last - 4, first)) + np.arange(5)[:, None]
+    away = np.abs(around.along[np.minimum(beside, last)] - here)
+    away = np.sort(np.where(beside <= last, away, np.inf), axis=0)
+    third = away[np.minimum(2, last - first), np.arange(len(which))]
+    reach = np.maximum(window, third + 1e-9)  # so that rounding does not leave it out
+    low = around.points_until(which, np.nextafter(here - reach, -np.inf))
+    counts = np.minimum(around.points_until(which, here + reach) - low, count)
     # The points near all places as one array, filled up with points that have no weight.
-    number = np.arange(counts.max())
-    columns = np.minimum(low[:, None] + number, len(along) - 1)
-    t = along[columns] - here[:, None]
-    columns %= count
-    weights = weights[columns] * (number < counts[:, None])
-    is_curved = (counts > 4) & (along[low + counts - 1] - along[low] > 2)
-    middles, slopes = _parabolas(t, weights, is_curved, ring[columns])
+    number = np.arange(counts.max(initial=1))[:, None]
+    columns = np.minimum(first + low + number, last)
+    along = around.along[columns]
+    is_end = ~closed & ((along == 0) | (along == total))
+    weights = np.where(is_end, END_WEIGHT, 1.0) * (number < counts)
+    is_curved = (counts > 4) & (around.along[first + low + counts - 1] - along[0] > 2)
+    knots, slopes = _parabolas(along - here, weights, is_curved, around.points[columns])
     size = hypot(*slopes.T)
     still = size < 1e-9
-    slopes[still] = (ring[np.minimum(places + 1, count - 1)] - ring[places - 1])[still]
+    chords = around.points[np.minimum(middle + 1, last)] - around.points[np.maximum(middle - 1, first)]
+    slopes[still] = chords[still]
     size = np.where(still, hypot(*slopes.T), size)
-    return middles, slopes / np.maximum(size, 1e-9)[:, None]
+    return knots, slopes / np.maximum(size, 1e-9)[:, None]
 
 
 def _parabolas(t: Floats, weights: Floats, is_curved: Bools, points: Floats) -> tuple[Floats, Floats]:
     """Fit parabolas, or lines where not ``is_curved``, by least squares with orthogonal polynomials of ``t``.
 
     Args:
-        t: Of the points, shape (place, point).
-        weights: Of the squared errors, shape (place, point).
+        t: Of the points, shape (point, place).
+        weights: Of the squared errors, shape (point, place).
         is_curved: Shape (place,).
-        points: Shape (place, point, 2).
+        points: Shape (point, place, 2).
 
     Returns:
         Values and slopes at 0, shape (place, 2) each.
     """
-    weight = weights.sum(axis=1)
-    middle = (weights * t).sum(axis=1) / weight
-    t = t - middle[:, None]
+    weight = weights.sum(axis=0)
+    middle = (weights * t).sum(axis=0) / weight
+    t = t - middle
     once = weights * t
-    spread = (once * t).sum(axis=1)
+    spread = (once * t).sum(axis=0)
     # Points in one place have no direction, and points in two places no curvature.
     spread = np.where(spread > RANK * weight, spread, np.inf)
-    lean, level = (once * t * t).sum(axis=1) / spread, (once * t).sum(axis=1) / weight
-    square = t * t - lean[:, None] * t - level[:, None]
+    lean, level = (once * t * t).sum(axis=0) / spread, (once * t).sum(axis=0) / weight
+    square = t * t - lean * t - level
     twice = weights * square
-    bend = (twice * square).sum(axis=1)
-    bend = np.where(is_curved & (bend > RANK * (once * t * t * t).sum(axis=1)), bend, np.inf)
+    bend = (twice * square).sum(axis=0)
+    bend = np.where(is_curved & (bend > RANK * (once * t * t * t).sum(axis=0)), bend, np.inf)
     values, slopes = [], []
     for axis in (0, 1):
         own = points[..., axis]
-        mean = (weights * own).sum(axis=1) / weight
-        slope = (once * own).sum(axis=1) / spread
-        curve = (twice * own).sum(axis=1) / bend
+        mean = (weights * own).sum(axis=0) / weight
+        slope = (once * own).sum(axis=0) / spread
+        curve = (twice * own).sum(axis=0) / bend
         values.append(mean - slope * middle + curve * (middle * middle + lean * middle - level))
         slopes.append(slope - curve * (2 * middle + lean))
     return np.stack(values, axis=1), np.stack(slopes, axis=1)

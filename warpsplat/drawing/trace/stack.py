@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
-from warpsplat.drawing.trace.hidden import Cover, shortest_path
+from warpsplat.drawing.trace.hidden import Cover, HiddenPaths
 from warpsplat.drawing.trace.outlines import Boundary
 from warpsplat.drawing.trace.planar import STEPS, Loops
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.portable.elementary import cos, hypot, sin
-from warpsplat.portable.linear import principal_direction
+from warpsplat.portable.linear import eigh
+from warpsplat.scene.scene import ranges, starts_of
 
 SEEN, EDGE, HIDDEN = range(3)
 """The side across a crack: a lower region, the outside of the image, a higher region."""
@@ -25,6 +27,7 @@ SEEN, EDGE, HIDDEN = range(3)
 DOT = 8  # cracks of the largest loop that is a dot, whose shape cannot be told
 STILL = 0.02  # [px] offset below which a boundary lies where the pixels meet
 UNDER = 1.0  # [px] how far an outline goes on under the region above it before it turns
+TAIL = 5  # points at the end of a stretch that tell its direction there
 _ANGLES = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 CIRCLE = np.stack([cos(_ANGLES), sin(_ANGLES)], axis=1)
 """Points on the unit circle, shape (12, 2)."""
@@ -32,13 +35,10 @@ CIRCLE = np.stack([cos(_ANGLES), sin(_ANGLES)], axis=1)
 Outline = list[Polyline | Floats]
 """A contour before its curves are fitted: runs, and corners (point, 2) between one run and the next."""
 
-Stretch = tuple[int, Ints]
-"""The side across some cracks in a row, and the cracks."""
-
 
 @dataclass(frozen=True)
-class OutlineTracer:
-    """The parts that outlines are made of."""
+class Layers:
+    """Regions in the order of painting, and the boundaries between them."""
 
     loops: Loops
     boundary: Boundary
@@ -50,154 +50,283 @@ class OutlineTracer:
     holed: Bools
     """Regions that are or contain something transparent, shape (region,)."""
 
-    def outline(self, loop: int) -> Outline:
-        """Return the contour of a loop; empty where it is hidden altogether."""
-        low, high = int(self.loops.first[loop]), int(self.loops.first[loop + 1])
-        cracks, rank = np.arange(low, high), int(self.ranks[self.loops.region[loop]])
-        others = self.loops.others[low:high]
-        kinds = np.where(self.hiding[np.maximum(others, 0)] > rank, HIDDEN, SEEN)
-        kinds = np.where(others == NO_REGION, EDGE, kinds)
-        if (kinds == HIDDEN).all():
-            if self.loops.is_hole[loop] and not self._is_holed(loop):
-                return []
-            if self.loops.is_hole[loop]:  # left open, a little smaller than what lies over it
-                between = 0.5 * (self.boundary.points[cracks] + self._middles(rank, cracks))
-                return [Polyline(self._points(cracks, closed=True, places=between), closed=True)]
-            kinds[:] = SEEN
-        if (kinds == kinds[0]).all():
-            return [self._ring(cracks) if kinds[0] == SEEN else self._vertices_at_turns(cracks)]
-        first = int(np.flatnonzero(kinds != np.roll(kinds, 1))[0])
-        cracks, kinds = np.roll(cracks, -first), np.roll(kinds, -first)
-        bounds = [*np.flatnonzero(np.diff(kinds, prepend=-1)).tolist(), len(kinds)]
-        stretches: list[Stretch] = [(int(kinds[a]), cracks[a:b]) for a, b in itertools.pairwise(bounds)]
-        return self._chain(rank, stretches)
 
-    def _is_holed(self, loop: int) -> bool:
-        """Return whether anything transparent lies in the hole that a loop bounds."""
-        return bool(self.holed[self.loops.region[self.loops.network == self.loops.network[loop]]].any())
+@dataclass(frozen=True)
+class Stretches:
+    """Cracks in a row with the same kind of side across; those of a loop follow one another."""
 
-    def _ring(self, cracks: Ints) -> Polyline | Floats:
-        """Return a loop that is seen all around."""
-        if len(cracks) <= DOT and np.abs(self.boundary.offsets[cracks]).max() > STILL:
-            return self._dot(cracks)
-        if self._is_pixel_exact(cracks):
-            return self._vertices_at_turns(cracks)
-        return Polyline(self._points(cracks, closed=True), closed=True)
+    layers: Layers
+    loop: Ints
+    """The loop that each is a part of, shape (stretch,)."""
+    kind: Ints
+    """The side across, shape (stretch,)."""
+    whole: Bools
+    """Whether it is all of its loop, shape (stretch,)."""
+    first: Ints
+    """First of the ``cracks`` of each and, last, their number, shape (stretch + 1,)."""
+    cracks: Ints
+    """Numbers of cracks, shape (crack,)."""
 
-    def _dot(self, cracks: Ints) -> Polyline:
-        """Return a circle of the loop's area about its middle."""
-        vertices = self.loops.vertices[cracks].astype(np.float64)
-        following = np.roll(vertices, -1, axis=0)
-        area = float((vertices[:, 0] * following[:, 1] - following[:, 0] * vertices[:, 1]).sum()) / 2
-        full = area + float(self.boundary.offsets[cracks].sum())
-        radius = np.sqrt(max(abs(full), 0.1) / np.pi)
-        middle = self.boundary.points[cracks].mean(axis=0)
-        return Polyline(middle + radius * CIRCLE * (1, np.sign(area)), closed=True)
+    @cached_property
+    def rank(self) -> Ints:
+        """The rank of the region of each, shape (stretch,)."""
+        return self.layers.ranks[self.layers.loops.region[self.loop]]
 
-    def _is_pixel_exact(self, cracks: Ints) -> bool:
-        """Return whether a stretch lies where the pixels meet and has few corners."""
-        if np.abs(self.boundary.offsets[cracks]).max() > STILL:
-            return False
-        turns = int((np.diff(self.loops.directions[cracks]) != 0).sum())
-        return turns <= 4 + len(cracks) / 40
+    @cached_property
+    def owner(self) -> Ints:
+        """The stretch that each crack is in, shape (crack,)."""
+        return np.repeat(np.arange(len(self.loop)), np.diff(self.first))
 
-    def _vertices_at_turns(self, cracks: Ints) -> Floats:
-        """Return the vertices where the cracks of a whole loop turn."""
-        directions = self.loops.directions[cracks]
-        return self.loops.vertices[cracks][directions != np.roll(directions, 1)].astype(np.float64)
+    def changes(self, values: Ints) -> Bools:
+        """Return where the value of a crack differs from that before, around whole loops; shape (crack,)."""
+        before = np.arange(len(values)) - 1
+        before[self.first[:-1]] = np.where(self.whole, self.first[1:], self.first[:-1] + 1) - 1
+        return np.asarray(values != values[before])
 
-    def _vertices_between(self, cracks: Ints) -> Floats:
-        """Return the vertices where the cracks of a stretch turn, its ends aside."""
-        directions = self.loops.directions[cracks]
-        return self.loops.vertices[cracks[1:]][directions[1:] != directions[:-1]].astype(np.float64)
+    @cached_property
+    def turns(self) -> Bools:
+        """Whether a crack has another direction than that before it, shape (crack,)."""
+        return self.changes(self.layers.loops.directions[self.cracks])
 
-    def _points(self, cracks: Ints, *, closed: bool, places: Floats | None = None) -> Floats:
-        """Return the good points of a stretch, or of other ``places``, without those at T-junctions."""
-        if places is None:
-            places = self.boundary.points[cracks]
-        others = self.loops.others[cracks]
-        change = others != np.roll(others, 1)
-        if not closed:
-            change[0] = False
-        good = self.boundary.is_good[cracks]
-        clean = good & ~(change | np.roll(change, -1))
-        keep = clean if clean.sum() >= max(4, 0.5 * good.sum()) else good
-        return places[keep] if keep.any() else places
+    @cached_property
+    def is_still(self) -> Bools:
+        """Whether a stretch lies where the pixels meet, shape (stretch,)."""
+        off = np.abs(self.layers.boundary.offsets[self.cracks])
+        return np.asarray(np.maximum.reduceat(off, self.first[:-1]) <= STILL)
 
-    def _middles(self, rank: int, cracks: Ints) -> Floats:
-        """Return points halfway through what hides a region beyond cracks, shape (crack, 2)."""
-        steps = STEPS[self.loops.directions[cracks]]
-        return self.cover.middles(rank, self.loops.vertices[cracks], steps, self.boundary.trends[cracks])
+    @cached_property
+    def is_exact(self) -> Bools:
+        """Whether it does, and has few corners, shape (stretch,)."""
+        begin = self.first[:-1]
+        turns = np.add.reduceat(self.turns.astype(np.intp), begin) - self.turns[begin]
+        return self.is_still & (turns <= 4 + np.diff(self.first) / 40)
 
-    def _chain(self, rank: int, stretches: list[Stretch]) -> Outline:
-        """Return a loop that is seen in parts."""
-        ends: list[tuple[Floats, Floats]] = []
-        count = len(stretches)
-        for number, (kind, cracks) in enumerate(stretches):
-            first, last = self._ends(cracks)
-            if kind == SEEN:
-                points = self._points(cracks, closed=False)
-                first = self._extended(rank, points[::-1], first, stretches[number - 1][0])
-                last = self._extended(rank, points, last, stretches[(number + 1) % count][0])
-            ends.append((first, last))
-        parts: Outline = []
-        for number, (kind, cracks) in enumerate(stretches):
-            start, end = ends[number]
-            if kind == SEEN and self._is_pixel_exact(cracks):
-                corners = np.concatenate([start[None], self._vertices_between(cracks), end[None]])
-                parts.append(Polyline(corners, False, is_polygon=True))
-            elif kind == SEEN:
-                parts.append(Polyline(self._points(cracks, closed=False), False, start, end))
-            elif kind == EDGE:  # the image's corners, and where a hidden stretch ends or begins
-                corners = np.concatenate([start[None], self._vertices_between(cracks), end[None]])
-                begin = 0 if stretches[number - 1][0] == HIDDEN else 1
-                stop = None if stretches[(number + 1) % count][0] == HIDDEN else -1
-                parts.append(corners[begin:stop])
-            else:
-                start, end = ends[number - 1][1], ends[(number + 1) % count][0]
-                goals = np.concatenate([start[None], self._middles(rank, cracks), end[None]])
-                vertices = self.loops.vertices[[*cracks, cracks[-1], cracks[-1]]].astype(np.float64)
-                # Something transparent may lie between regions as well as inside one.
-                holed = bool(self.holed.any())
-                parts.append(shortest_path(self.cover, rank, goals, vertices, through_holes=holed))
-        return parts
+    @cached_property
+    def middles(self) -> Floats:
+        """Points halfway through what hides a region beyond each crack, shape (crack, 2); known if hidden."""
+        loops, hidden = self.layers.loops, np.flatnonzero(self.kind[self.owner] == HIDDEN)
+        cracks = self.cracks[hidden]
+        steps, trends = STEPS[loops.directions[cracks]], self.layers.boundary.trends[cracks]
+        middles = np.zeros((len(self.cracks), 2))
+        ranks = self.rank[self.owner[hidden]]
+        middles[hidden] = self.layers.cover.middles(ranks, loops.vertices[cracks], steps, trends)
+        return middles
 
-    def _ends(self, cracks: Ints) -> tuple[Floats, Floats]:
-        """Return the vertices where a stretch begins and ends."""
-        last = cracks[-1]
-        end = self.loops.vertices[last] + STEPS[self.loops.directions[last]]
-        return self.loops.vertices[cracks[0]].astype(np.float64), end.astype(np.float64)
+    @cached_property
+    def points(self) -> tuple[Floats, Ints]:
+        """The good points, without those at T-junctions; the first of each stretch and, last, their number.
 
-    def _extended(self, rank: int, points: Floats, vertex: Floats, kind: int) -> Floats:
-        """Return where a seen stretch ends: beside its last vertex, or under what lies above.
-
-        Args:
-            rank: Of the region.
-            points: Of the stretch, towards this end, shape (point, 2).
-            vertex: Where its last crack ends.
-            kind: Of the stretch that comes next.
+        Of a hidden stretch, those between the boundary and the middles.
         """
-        tail = points[-5:]
-        if len(tail) < 2:
-            return vertex
-        middle, direction = tail.mean(axis=0), principal_direction(tail)
-        direction = direction if (direction * (tail[-1] - tail[0])).sum() > 0 else -direction
-        if kind == EDGE:
-            return self._extended_to_edge(middle, direction, vertex)
-        ahead, behind = ((place - middle) * direction for place in (vertex, tail[-1]))
-        reached = middle + direction * max(float(ahead.sum()), float(behind.sum()) + 0.1)
-        if hypot(*(reached - vertex)) > 1.0:
-            reached = vertex
-        further = reached + UNDER * direction
-        return further if self.cover.hides(rank, further[None])[0] else reached
+        places = self.layers.boundary.points[self.cracks]
+        hidden = (self.kind == HIDDEN)[self.owner, None]
+        places = np.where(hidden, 0.5 * (places + self.middles), places)
+        change = self.changes(self.layers.loops.others[self.cracks])
+        after = np.arange(1, len(change) + 1)
+        after[self.first[1:] - 1] = self.first[:-1]
+        good = self.layers.boundary.is_good[self.cracks]
+        clean = good & ~(change | change[after])
+        begin = self.first[:-1]
+        counts = [np.add.reduceat(mask.astype(np.intp), begin) for mask in (clean, good)]
+        enough = counts[0] >= np.maximum(4, 0.5 * counts[1])
+        keep = np.where(enough[self.owner], clean, good) | (counts[1] == 0)[self.owner]
+        return places[keep], np.searchsorted(np.flatnonzero(keep), self.first)
 
-    def _extended_to_edge(self, middle: Floats, direction: Floats, vertex: Floats) -> Floats:
-        """Return where a line meets the edge of the image, or ``vertex`` if that is far away."""
-        size = self.cover.ranks.shape[::-1]
-        axis = 0 if vertex[0] in (0, size[0]) else 1
-        if abs(direction[axis]) < 0.3:
-            return vertex
-        reached = middle + direction * (vertex[axis] - middle[axis]) / direction[axis]
-        reached[axis] = vertex[axis]
-        reached[1 - axis] = np.clip(reached[1 - axis], 0, size[1 - axis])
-        return reached if hypot(*(reached - vertex)) < 1.5 else vertex
+    @cached_property
+    def vertices(self) -> list[Floats]:
+        """The vertices where the cracks of each stretch turn."""
+        vertices = self.layers.loops.vertices[self.cracks][self.turns].astype(np.float64)
+        bounds = np.searchsorted(np.flatnonzero(self.turns), self.first).tolist()
+        return [vertices[low:high] for low, high in itertools.pairwise(bounds)]
+
+    @cached_property
+    def neighbours(self) -> tuple[Ints, Ints]:
+        """The stretches before and after each one, around its loop."""
+        number = np.arange(len(self.loop))
+        is_first = np.append(True, np.diff(self.loop) != 0)[: len(number)]
+        is_last = np.append(is_first[1:], True)[: len(number)]
+        before, after = number - 1, number + 1
+        before[is_first], after[is_last] = number[is_last], number[is_first]
+        return before, after
+
+
+def find_stretches(layers: Layers) -> Stretches:
+    """Cut the loops of what is painted into stretches; those that are hidden altogether are left out."""
+    loops = layers.loops
+    chosen = np.flatnonzero((loops.region >= 0) & (layers.ranks[loops.region] >= 0))
+    counts = np.diff(loops.first)[chosen]
+    cracks, owner = ranges(loops.first[chosen], counts), np.repeat(np.arange(len(chosen)), counts)
+    others = loops.others[cracks]
+    above = layers.hiding[np.maximum(others, 0)] > layers.ranks[loops.region[chosen]][owner]
+    kinds = np.where(others == NO_REGION, EDGE, np.where(above, HIDDEN, SEEN))
+    hidden = np.bincount(owner, kinds != HIDDEN, len(chosen)) == 0
+    # Something transparent may lie anywhere in a hole, not at its border alone.
+    outer = ~loops.is_hole
+    networks = np.bincount(loops.network[outer], layers.holed[loops.region[outer]], loops.network.max() + 1)
+    holed = networks[loops.network[chosen]] > 0
+    # What has no boundary that is seen is drawn all the same, if it is no hole. A hole of it is left open, a
+    # little smaller than what lies over it, where that is transparent inside.
+    kinds[(hidden & ~loops.is_hole[chosen])[owner]] = SEEN
+    kept = ~(hidden & loops.is_hole[chosen] & ~holed)
+    cracks, kinds, owner = (
+        cracks[kept[owner]],
+        kinds[kept[owner]],
+        np.repeat(np.arange(kept.sum()), counts[kept]),
+    )
+    loop, counts = chosen[kept], counts[kept]
+    first, number = starts_of(counts)[:-1], ranges(np.zeros_like(counts), counts)
+    before = first[owner] + (number - 1) % counts[owner]
+    changes = np.flatnonzero(kinds != kinds[before])
+    # Each loop begins where its kind changes first.
+    begin = np.zeros(len(loop), np.intp)
+    begin[owner[changes[::-1]]] = number[changes[::-1]]
+    order = first[owner] + (number + begin[owner]) % counts[owner]
+    cracks, kinds = cracks[order], kinds[order]
+    starts = np.flatnonzero((number == 0) | (kinds != np.roll(kinds, 1)))
+    whole = np.bincount(owner[starts], minlength=len(loop))[owner[starts]] == 1
+    return Stretches(
+        layers, loop[owner[starts]], kinds[starts], whole, np.append(starts, len(cracks)), cracks
+    )
+
+
+def find_outlines(layers: Layers) -> list[tuple[int, Outline]]:
+    """Return the contours of all that is painted, with the region that each bounds."""
+    stretches = find_stretches(layers)
+    if not len(stretches.loop):
+        return []
+    starts, ends = _ends(stretches)
+    paths = _hidden_paths(stretches, starts, ends)
+    outlines: list[tuple[int, Outline]] = []
+    regions = layers.loops.region[stretches.loop].tolist()
+    is_first = np.append(True, np.diff(stretches.loop) != 0).tolist()
+    for number, whole in enumerate(stretches.whole.tolist()):
+        if is_first[number]:
+            outlines.append((regions[number], []))
+        if whole:
+            part = _ring(stretches, number)
+        elif stretches.kind[number] == HIDDEN:
+            part = paths[number]
+        else:
+            part = _part(stretches, number, starts[number], ends[number])
+        outlines[-1][1].append(part)
+    return outlines
+
+
+def _ring(stretches: Stretches, number: int) -> Polyline | Floats:
+    """Return a loop that is all of one kind."""
+    points, first = stretches.points
+    cracks = stretches.cracks[stretches.first[number] : stretches.first[number + 1]]
+    kind = stretches.kind[number]
+    if kind == SEEN and len(cracks) <= DOT and not stretches.is_still[number]:
+        return _dot(stretches.layers, cracks)
+    if kind == EDGE or (kind == SEEN and stretches.is_exact[number]):
+        return stretches.vertices[number]
+    return Polyline(points[first[number] : first[number + 1]], closed=True)
+
+
+def _dot(layers: Layers, cracks: Ints) -> Polyline:
+    """Return a circle of a loop's area about its middle."""
+    vertices = layers.loops.vertices[cracks].astype(np.float64)
+    following = np.roll(vertices, -1, axis=0)
+    area = float((vertices[:, 0] * following[:, 1] - following[:, 0] * vertices[:, 1]).sum()) / 2
+    full = area + float(layers.boundary.offsets[cracks].sum())
+    radius = np.sqrt(max(abs(full), 0.1) / np.pi)
+    middle = layers.boundary.points[cracks].mean(axis=0)
+    return Polyline(middle + radius * CIRCLE * (1, np.sign(area)), closed=True)
+
+
+def _part(stretches: Stretches, number: int, start: Floats, end: Floats) -> Polyline | Floats:
+    """Return a part of a loop that is seen or at the edge of the image."""
+    corners = np.concatenate([start[None], stretches.vertices[number], end[None]])
+    if stretches.kind[number] == EDGE:  # the image's corners, and where a hidden stretch ends or begins
+        before, after = (stretches.kind[beside[number]] == HIDDEN for beside in stretches.neighbours)
+        return corners[0 if before else 1 : None if after else -1]
+    if stretches.is_exact[number]:
+        return Polyline(corners, False, is_polygon=True)
+    points, first = stretches.points
+    return Polyline(points[first[number] : first[number + 1]], False, start, end)
+
+
+def _ends(stretches: Stretches) -> tuple[Floats, Floats]:
+    """Return where stretches begin and end, (stretch, 2) each; those that are seen go on under others."""
+    loops = stretches.layers.loops
+    head, last = (stretches.cracks[index] for index in (stretches.first[:-1], stretches.first[1:] - 1))
+    starts = loops.vertices[head].astype(np.float64)
+    ends = (loops.vertices[last] + STEPS[loops.directions[last]]).astype(np.float64)
+    seen = np.flatnonzero((stretches.kind == SEEN) & ~stretches.whole)
+    _, first = stretches.points
+    before, after = (stretches.kind[beside[seen]] for beside in stretches.neighbours)
+    number = np.arange(TAIL)
+    inside = number < np.diff(first)[seen, None]
+    tails = first[seen, None] + number, first[seen + 1, None] - 1 - number
+    starts[seen] = _extended(stretches, seen, np.where(inside, tails[0], -1), starts[seen], before)
+    ends[seen] = _extended(stretches, seen, np.where(inside, tails[1], -1), ends[seen], after)
+    return starts, ends
+
+
+def _extended(stretches: Stretches, seen: Ints, tails: Ints, vertices: Floats, kinds: Ints) -> Floats:
+    """Return where seen stretches end: beside the last vertex, or under what lies above.
+
+    Args:
+        stretches: Of all.
+        seen: Numbers of those that are seen, shape (n,).
+        tails: Numbers of the last points, from the end inwards, -1 for no point; shape (n, TAIL).
+        vertices: Where the last crack ends, shape (n, 2).
+        kinds: Of the stretch that comes next, shape (n,).
+    """
+    inside, points = (tails >= 0)[..., None], stretches.points[0][tails]
+    count = inside.sum(axis=1)
+    middle = np.where(inside, points, 0).sum(axis=1) / np.maximum(count, 1)
+    x, y = np.moveaxis(np.where(inside, points - middle[:, None], 0), 2, 0)
+    mixed = (x * y).sum(axis=1)
+    shape = np.stack([(x * x).sum(axis=1), mixed, mixed, (y * y).sum(axis=1)], axis=1)
+    direction = eigh(shape.reshape(-1, 2, 2))[1][..., 1]
+    way = points[:, 0] - points[np.arange(len(seen)), np.maximum(count[:, 0] - 1, 0)]
+    direction = np.where((direction * way).sum(axis=1, keepdims=True) > 0, direction, -direction)
+    ahead, behind = (((place - middle) * direction).sum(axis=1) for place in (vertices, points[:, 0]))
+    reached = middle + direction * np.maximum(ahead, behind + 0.1)[:, None]
+    reached = np.where((hypot(*(reached - vertices).T) > 1.0)[:, None], vertices, reached)
+    further = reached + UNDER * direction
+    hidden = stretches.layers.cover.hides(stretches.rank[seen], further)
+    reached = np.where(hidden[:, None], further, reached)
+    size = np.array(stretches.layers.cover.ranks.shape[::-1])
+    at_edge = _at_edge(middle, direction, vertices, size)
+    reached = np.where((kinds == EDGE)[:, None], at_edge, reached)
+    return np.where(count < 2, vertices, reached)
+
+
+def _at_edge(middle: Floats, direction: Floats, vertices: Floats, size: Ints) -> Floats:
+    """Return where lines meet the edge of the image, or ``vertices`` if that is far away."""
+    number = np.arange(len(vertices))
+    axis = np.where((vertices[:, 0] == 0) | (vertices[:, 0] == size[0]), 0, 1)
+    slope, edge = direction[number, axis], vertices[number, axis]
+    is_steep = np.abs(slope) >= 0.3
+    reached = middle + direction * ((edge - middle[number, axis]) / np.where(is_steep, slope, 1))[:, None]
+    reached = np.clip(reached, 0, size)
+    reached[number, axis] = edge
+    is_near = is_steep & (hypot(*(reached - vertices).T) < 1.5)
+    return np.where(is_near[:, None], reached, vertices)
+
+
+def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[int, Floats]:
+    """Return the corners of each hidden stretch, from the stretch before to the one after."""
+    hidden = np.flatnonzero((stretches.kind == HIDDEN) & ~stretches.whole)
+    if not len(hidden):
+        return {}
+    before, after = (beside[hidden] for beside in stretches.neighbours)
+    begin, counts = stretches.first[hidden], np.diff(stretches.first)[hidden]
+    index, first = ranges(begin, counts), starts_of(counts + 2)
+    goals, vertices = np.empty((2, first[-1], 2))
+    inner = ranges(first[:-1] + 1, counts)
+    goals[first[:-1]], goals[inner], goals[first[1:] - 1] = (
+        ends[before],
+        stretches.middles[index],
+        starts[after],
+    )
+    loops, last = stretches.layers.loops, stretches.cracks[begin + counts - 1]
+    vertices[inner - 1] = loops.vertices[stretches.cracks[index]]
+    vertices[first[1:] - 2] = vertices[first[1:] - 1] = loops.vertices[last]
+    # Something transparent may lie between regions as well as inside one.
+    holed = bool(stretches.layers.holed.any())
+    paths = HiddenPaths(stretches.layers.cover, stretches.rank[hidden], holed, first, goals, vertices)
+    return dict(zip(hidden.tolist(), paths.corners(), strict=True))

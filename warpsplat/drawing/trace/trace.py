@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight as straight_color
-from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
 from warpsplat.drawing.trace.grids import Bools, Floats
@@ -20,12 +20,14 @@ from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import OutlineTracer
+from warpsplat.drawing.trace.stack import Layers, find_outlines
+from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
 OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
-MOST_REGIONS = 3000  # of any image; one with more is no drawing
+LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
+FEW_REGIONS = 3000  # which any image may have
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ def trace(image: FloatArray, *, most: int | None = None) -> Traced:
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
-    regions = fewer_regions(find_regions(levels), MOST_REGIONS)
+    height, width = levels.shape[:2]
+    regions = fewer_regions(find_regions(levels), max(FEW_REGIONS, height * width // LEAST_AREA))
     traced = trace_regions(regions, may_have_ground=is_opaque)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
@@ -66,6 +69,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
         regions: Of an image.
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
     """
+    regions = with_sub_pixels(regions)
     loops = find_loops(regions.labels, regions.image)
     boundary = find_boundary(loops, regions)
     tree = find_tree(loops, len(regions.paint))
@@ -75,37 +79,43 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
     cover = Cover(hiding[regions.labels])
-    tracer = OutlineTracer(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque))
-    painted = np.flatnonzero((loops.region >= 0) & (ranks[loops.region] >= 0)).tolist()
-    outlines = [(int(loops.region[loop]), tracer.outline(loop)) for loop in painted]
+    outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
-    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
+    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
+    found = [
+        (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
+        for region, outline in outlines
+    ]
+    known = [(region, contour) for region, contour in found if contour is not None]
     contours: dict[int, list[Pieces]] = {}
-    for region, outline in outlines:
-        contour = assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline])
-        if contour is not None and len(contour.cubics) > 1:
-            contours.setdefault(region, []).append(contour)
+    joined = with_joined_lines([contour for _, contour in known])
+    for (region, _), contour in zip(known, joined, strict=True):
+        if len(contour.cubics) > 1:
+            contours.setdefault(region, []).append(replace(contour, cubics=contour.cubics / regions.scale))
     shapes = [
         Fill(regions.colorings[regions.paint[region]], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
     ]
-    height, width = regions.labels.shape
+    height, width = (side // regions.scale for side in regions.labels.shape)
     background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
     return _scene(Canvas(width, height, background), merged(shapes))
 
 
 TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve
 STAIRCASE_TOLERANCE = 0.62  # [px] the same without antialiasing: steps are half a pixel off
+SUB_PIXEL_TOLERANCE = 0.14  # [px] the same of one of sub-pixels
 NOISE_TOLERANCE = 0.02  # [px] that a level of noise adds
 
 
-def tolerance_of(offsets: Floats, loops: Loops, noise: float) -> float:
-    """Return how near curves must follow the boundary [px]; without antialiasing it is a staircase."""
+def tolerance_of(offsets: Floats, loops: Loops, regions: Regions) -> float:
+    """Return how near curves must follow the boundary; without antialiasing it is a staircase."""
+    if regions.scale > 1:
+        return regions.scale * SUB_PIXEL_TOLERANCE
     inner = loops.others >= 0
     moved = np.abs(offsets[inner]) > 0.03
     if not len(moved):
         return TOLERANCE
-    return (STAIRCASE_TOLERANCE if moved.mean() < 0.1 else TOLERANCE) + NOISE_TOLERANCE * noise
+    return (STAIRCASE_TOLERANCE if moved.mean() < 0.1 else TOLERANCE) + NOISE_TOLERANCE * regions.noise
 
 
 def _ground(regions: Regions, tree: Tree, *, may_have_ground: bool) -> tuple[Bools, Coloring | None]:
@@ -130,7 +140,7 @@ def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:
     points = [contour.cubics[:, :3].reshape(-1, 2) for contour in contours]
     colors = np.array([shape.coloring.color for shape in shapes]).reshape(-1, 4)
     has_ramp = np.array([shape.coloring.ramp is not None for shape in shapes], np.bool_)
-    joints = np.concatenate([*map(joints_of, contours), np.zeros(0, np.int32)])
+    joints = joints_of(contours)
     scene = Scene(
         canvas,
         np.full(len(shapes), Kind.FILL, np.int32),

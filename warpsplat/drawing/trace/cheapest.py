@@ -1,0 +1,166 @@
+"""The cheapest chain of lines and cubics along a span, from knot to knot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from warpsplat.drawing.trace.cubics import fit_handles
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.spans import Spans
+from warpsplat.portable.elementary import hypot
+from warpsplat.scene.scene import ranges
+
+SAMPLES = 16  # points at which the error of a candidate is measured
+LINE_COST, CUBIC_COST = 1.0, 1.4  # what a piece counts, about its bytes
+ERROR_COST = 0.35  # what an error of the size of the tolerance counts for each piece
+FORCED_COST = 2 * CUBIC_COST  # of a cubic between two knots that are neighbours, whatever its error
+STRIDE, FAR = 4, 2.0  # between knots whose pairs are tried first; tolerances of a piece that is far off
+PAIRS = 1 << 17  # of knots that are looked at together, about, which bounds the memory
+CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Pieces that may be parts of chains."""
+
+    span: Ints
+    """The span that each is in, shape (candidate,)."""
+    begin: Ints
+    """The number of the knot where it begins, shape (candidate,); as well ``end``."""
+    end: Ints
+    cubics: Floats
+    """Shape (candidate, 4, 2)."""
+    is_line: Bools
+    """Whether a straight line is cheaper, shape (candidate,)."""
+    costs: Floats
+    """Infinite where neither is near enough, shape (candidate,)."""
+
+    def take(self, index: Ints | Bools) -> Candidates:
+        """Return some of them."""
+        return Candidates(*(getattr(self, field.name)[index] for field in fields(Candidates)))
+
+    @staticmethod
+    def joined(parts: list[Candidates]) -> Candidates:
+        """Return those of several groups."""
+        return Candidates(
+            *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Candidates))
+        )
+
+
+def cheapest_chains(spans: Spans, tolerance: float) -> Candidates:
+    """Return the pieces of the cheapest chain of each span, in order.
+
+    A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
+    three lines is cheaper than any of three: most spans need no other candidates.
+
+    Args:
+        spans: Not empty.
+        tolerance: Largest distance of a point from its curve [px].
+    """
+    first, last = spans.first[:-1], spans.first[1:] - 1
+    number = np.arange(len(first))
+    whole = _candidates(spans, number, first, last, tolerance)
+    is_enough = np.isfinite(whole.costs) | (last == first + 1)
+    rest = number[~is_enough]
+    inner = last[rest] - first[rest] - 1
+    owner, middle = np.repeat(rest, inner), ranges(first[rest] + 1, inner)
+    heads = _candidates(spans, owner, first[owner], middle, tolerance)
+    tails = _candidates(spans, owner, middle, last[owner], tolerance)
+    both = heads.costs + tails.costs
+    order = np.lexsort((both, owner))
+    best = order[np.append(True, np.diff(owner[order]) != 0)[: len(order)]]
+    best = best[(both[best] < 3 * LINE_COST) | (inner[np.searchsorted(rest, owner[best])] == 1)]
+    rest = np.setdiff1d(rest, owner[best])
+    found = [whole.take(is_enough), heads.take(best), tails.take(best)]
+    pairs = np.cumsum((last - first)[rest] ** 2)
+    for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):
+        found.append(_cheapest(spans, group, tolerance))
+    chains = Candidates.joined(found)
+    return chains.take(np.argsort(chains.begin, kind="stable"))
+
+
+def _cheapest(spans: Spans, group: Ints, tolerance: float) -> Candidates:
+    """Return the cheapest chains of some spans, by dynamic programming over pairs of knots."""
+    first, last = spans.first[group], spans.first[group + 1] - 1
+    number, begin, end = _pairs(last - first + 1)
+    # What is longer than a piece that is far off is not tried.
+    steps = (last - first) // STRIDE + 1
+    coarse, low, high = _pairs(steps)
+    near = np.ones((len(group), *2 * (int(steps.max(initial=1)),)), np.bool_)
+    knots = first[coarse] + STRIDE * low, first[coarse] + STRIDE * high
+    near[coarse, low, high] = np.isfinite(_candidates(spans, group[coarse], *knots, FAR * tolerance).costs)
+    inner = -(-begin // STRIDE), end // STRIDE
+    tried = np.flatnonzero((inner[1] <= inner[0]) | near[number, np.minimum(inner[0], inner[1]), inner[1]])
+    number, level = number[tried], begin[tried]
+    begin, end = first[number] + level, first[number] + end[tried]
+    pieces = _candidates(spans, group[number], begin, end, tolerance)
+    # A curve may go to the next knot, whatever its error.
+    costs = np.where((end == begin + 1) & ~np.isfinite(pieces.costs), FORCED_COST, pieces.costs)
+    best, back = np.full(len(spans.knots), np.inf), np.zeros(len(spans.knots), np.intp)
+    best[first] = 0
+    order = np.argsort(level, kind="stable")
+    # What begins at the nth knot of a span comes after what ends there, so that its cost is known.
+    for part in np.split(order, np.flatnonzero(np.diff(level[order])) + 1):
+        total, goal = best[begin[part]] + costs[part], end[part]
+        better = total < best[goal]
+        best[goal[better]], back[goal[better]] = total[better], part[better]
+    at, picked = last, [back[:0]]
+    while len(at):
+        picked.append(back[at])
+        at = begin[picked[-1]][level[picked[-1]] > 0]
+    return pieces.take(np.concatenate(picked))
+
+
+def _pairs(counts: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return all pairs of ascending numbers below each count: the index of the count, and the two numbers."""
+    owner, low = np.repeat(np.arange(len(counts)), counts), ranges(np.zeros_like(counts), counts)
+    after = counts[owner] - 1 - low
+    return np.repeat(owner, after), np.repeat(low, after), ranges(low + 1, after)
+
+
+def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> Candidates:
+    """Return candidates between knots, shape (candidate,) each."""
+    parts = [slice(low, low + CHUNK) for low in range(0, max(len(span), 1), CHUNK)]
+    return Candidates.joined([_some(spans, span[i], begin[i], end[i], tolerance) for i in parts])
+
+
+def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> Candidates:
+    """Return candidates as ``_candidates``, not so many."""
+    low, high = spans.places[begin], spans.places[end]
+    where = low + (high - low) * np.linspace(0, 1, SAMPLES)[:, None]
+    left = np.minimum(where.astype(np.intp), high - 1)
+    share = where - left
+    start, goal = spans.knots[begin], spans.knots[end]
+    x, y = (
+        own[left] * (1 - share) + own[left + 1] * share - origin
+        for own, origin in zip(spans.points.T, start.T, strict=True)
+    )
+    # Towards a knot its own place counts, not the noisy point there.
+    x[0], y[0], (x[-1], y[-1]) = 0, 0, (goal - start).T
+    costs = _costs(_line_errors(x, y), LINE_COST, tolerance)
+    is_line = np.isfinite(costs)
+    cubics = np.stack([start, start, goal, goal], axis=1)
+    # No cubic is cheaper than a line that is near enough.
+    bent = np.flatnonzero(~is_line)
+    ahead, back = spans.tangents[begin[bent]], -spans.tangents[end[bent]]
+    handles, errors = fit_handles(ahead.T, back.T, x[:, bent], y[:, bent])
+    cubics[bent, 1] += handles[0][:, None] * ahead
+    cubics[bent, 2] += handles[1][:, None] * back
+    costs[bent] = _costs(errors, CUBIC_COST, tolerance)
+    return Candidates(span, begin, end, cubics, is_line, costs)
+
+
+def _costs(errors: Floats, base: float, tolerance: float) -> Floats:
+    return np.where(errors <= tolerance, base + ERROR_COST * (errors / tolerance) ** 2, np.inf)
+
+
+def _line_errors(x: Floats, y: Floats) -> Floats:
+    """Return the largest distance of points (sample, line) from the line between the origin and the last."""
+    end_x, end_y = x[-1], y[-1]
+    size = np.maximum(hypot(end_x, end_y), 1e-9)
+    aside = np.abs(x * end_y - y * end_x).max(axis=0) / size
+    along = (x * end_x + y * end_y) / size
+    beyond = np.maximum(-along, along - size).max(axis=0)
+    return np.where(size < 1e-6, np.inf, np.maximum(aside, beyond))
