@@ -111,15 +111,14 @@ def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
     assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3
 
 
-def test_gradients_stay_while_outlines_are_fitted(device: str) -> None:
+def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> None:
     backend = Backend.on(device)
     exact = logo()
     ramps = with_gradients(exact.scene)
     target = render(ramps, backend=backend)
-    off = replace(ramps, points=logo(spread=0.3).scene.points)
+    off = replace(ramps, frames=ramps.frames + np.float32(0.7) * (ramps.frames != 0))
     found = fitted(target, replace(exact, scene=off), backend)
-    assert psnr(found, target, backend) > psnr(off, target, backend) + 10
-    np.testing.assert_array_equal(found.frames, ramps.frames)
+    assert psnr(found, target, backend) > psnr(off, target, backend) + 3
     np.testing.assert_array_equal(found.stop_opacities, ramps.stop_opacities)
 
 

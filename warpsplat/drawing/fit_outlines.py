@@ -19,14 +19,14 @@ from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 STEPS = 12
 """Most steps of a refinement."""
 
-LEAST_GAIN, MOST_IDLE = 0.005, 3
+LEAST_GAIN, MOST_IDLE = 0.005, 4
 """A refinement ends when so many steps in a row have not lowered the least error by this share."""
 
-DAMPING, LEAST_DAMPING, CALMER = 0.03, 0.01, 0.3
-"""Added curvature, as a share, at first and at the least, and its factor where a step lowered the error."""
+DAMPING, RAISED = 0.03, 0.3
+"""Added curvature, as a share, at first, and where a step did not lower the error: more of it gets stuck."""
 
-RAISED, WILDER, MOST_DAMPING = 3.0, 8.0, 100.0
-"""Where it did not: the least, the factor and the most."""
+LEAST_DAMPING, CALMER = 0.01, 0.1
+"""The least of it, and its factor where a step lowered the error."""
 
 MOST_STEP = 0.7
 """How far a step may move a point along each free number [px]: measured distances hold about as far."""
@@ -149,8 +149,7 @@ class OutlineFit:
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at = self._constraints.project(at + change.reshape(-1, 2))
             error, now = self._measure.error(at)
-            worse = np.clip(WILDER * damping, RAISED, MOST_DAMPING)
-            damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), worse)
+            damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED)
             around = now
             idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:

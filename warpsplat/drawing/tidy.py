@@ -28,7 +28,7 @@ from warpsplat.svg.write import GRIDS, rounded, write_svg
 ROUNDS = 16
 """Most rounds in which edits are tried."""
 
-FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 12, 8, 4
+FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
 LEAST_ERROR = 3e-5
