@@ -251,7 +251,7 @@ def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     contours = {}
     for one in chosen:
         cubics = one.made.cubics()
-        joints = joints_of(Pieces(cubics, _is_line(cubics)))
+        joints = joints_of([Pieces(cubics, _is_line(cubics))])
         contours[one.contour] = cubics[:, :3].reshape(-1, 2), joints
     return with_contours(drawing, contours)
 

@@ -19,9 +19,6 @@ Result = npt.NDArray[Any]
 SWEEPS = 30
 """Most rounds of Jacobi rotations; they converge quadratically, within ten."""
 
-DEPENDENT = 1e-20
-"""Fraction of a column's square norm below which it depends on the columns before."""
-
 LOOPED = 64
 """Longest inner index that is summed term by term, rather than by NumPy."""
 
@@ -170,29 +167,6 @@ def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
     kept = values > tolerance * values[..., :1]
     inverted = np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
     return product(np.swapaxes(right, -2, -1) * inverted[..., None, :], np.swapaxes(left, -2, -1))
-
-
-def lstsq(matrix: Matrices, right: Matrices) -> Result:
-    """Return the shortest ``x`` (n,) with the least squared error of ``matrix @ x = right``, (m, n) and (m,).
-
-    By orthogonalising the columns, or if some are nearly dependent, by the pseudo-inverse.
-    """
-    matrix, right = np.asarray(matrix, np.float64), np.asarray(right, np.float64)
-    size = matrix.shape[1]
-    rest = np.concatenate([matrix.T, right[None]])
-    whole = (rest * rest).sum(axis=1)
-    shares = np.zeros((size, size + 1))
-    for k in range(size):
-        column = rest[k]
-        square = (column * column).sum()
-        if square <= DEPENDENT * whole[k]:
-            return product(pinv(matrix, np.finfo(np.float64).eps * max(matrix.shape)), right)
-        shares[k, k + 1 :] = (column * rest[k + 1 :]).sum(axis=1) / square
-        rest[k + 1 :] -= shares[k, k + 1 :, None] * column
-    found = shares[:, size].copy()
-    for k in range(size - 1, 0, -1):
-        found[:k] -= shares[:k, k] * found[k]
-    return found
 
 
 def solve_banded(diagonals: Sequence[Matrices], right: Matrices) -> Result:

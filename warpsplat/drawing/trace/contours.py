@@ -12,6 +12,7 @@ from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene.attributes import Joint
+from warpsplat.scene.scene import starts_of
 
 OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
@@ -39,15 +40,35 @@ def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
         if hypot(*(goal - last)) > 1e-3:
             cubics.append(straight(last, goal)[None])
             lines.append(np.ones(1, np.bool_))
-    return _with_joined_lines(Pieces(np.concatenate(cubics), np.concatenate(lines)))
+    return Pieces(np.concatenate(cubics), np.concatenate(lines))
+
+
+def with_joined_lines(contours: list[Pieces]) -> list[Pieces]:
+    """Return contours with one line for several that go on in the same direction."""
+    cubics, lines, before, first = _around(contours)
+    joined = lines & lines[before] & _are_straight_on(cubics[before], cubics)
+    any_joined = np.isin(
+        np.arange(len(contours)), np.searchsorted(first, np.flatnonzero(joined), "right") - 1
+    )
+    return [
+        _with_joined_lines(contour) if joined else contour
+        for contour, joined in zip(contours, any_joined.tolist(), strict=True)
+    ]
+
+
+def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:
+    """Return cubics of contours, which are lines, the cubic before each, and the first of each contour."""
+    counts = np.array([len(contour.cubics) for contour in contours], np.int64)
+    first = starts_of(counts)
+    before = np.arange(first[-1]) - 1
+    before[first[:-1]] = first[1:] - 1
+    cubics = np.concatenate([*(contour.cubics for contour in contours), np.zeros((0, 4, 2))])
+    lines = np.concatenate([*(contour.lines for contour in contours), np.zeros(0, np.bool_)])
+    return cubics, lines, before, first
 
 
 def _with_joined_lines(contour: Pieces) -> Pieces:
     """Return a contour with one line for several that go on in the same direction."""
-    before = np.roll(contour.cubics, 1, axis=0)
-    joined = contour.lines & np.roll(contour.lines, 1) & _are_straight_on(before, contour.cubics)
-    if not joined.any():
-        return contour
     kept: list[Floats] = []
     is_line: list[bool] = []
     for cubic, line in zip(contour.cubics, contour.lines.tolist(), strict=True):
@@ -71,11 +92,11 @@ def _are_straight_on(ones: Floats, others: Floats) -> Bools:
     return (size >= 1e-6) & forward & (off <= OFF_LINE * size)
 
 
-def joints_of(contour: Pieces) -> Ints:
-    """Return the joint of each point of a contour, three for each piece."""
-    cubics, lines = contour.cubics, contour.lines
-    before, line_before = np.roll(cubics, 1, axis=0), np.roll(lines, 1)
-    arriving, leaving = before[:, 3] - before[:, 2], cubics[:, 1] - cubics[:, 0]
+def joints_of(contours: list[Pieces]) -> Ints:
+    """Return the joint of each point of contours, three for each piece."""
+    cubics, lines, before, _ = _around(contours)
+    line_before = lines[before]
+    arriving, leaving = (cubics[:, 3] - cubics[:, 2])[before], cubics[:, 1] - cubics[:, 0]
     cross = np.abs(arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0])
     dot = (arriving * leaving).sum(axis=1)
     # Bending a long handle by a small angle moves a curve by pixels.

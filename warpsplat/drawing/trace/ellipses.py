@@ -8,13 +8,14 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.portable.elementary import hypot
-from warpsplat.portable.linear import DEPENDENT, determinant, eigh, product, solve
+from warpsplat.portable.linear import determinant, eigh, product, solve
 from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.scene.scene import starts_of
 
 QUARTER = np.array([(1, 0), (1, ARC_HANDLE), (ARC_HANDLE, 1), (0, 1)])
 TURN = np.array([(0, -1), (1, 0)])
 LEAST_POINTS = 6  # that tell an ellipse from any other outline
+DEPENDENT = 1e-20  # fraction of a column's square norm below which it depends on the columns before
 LONGEST = 20  # axis of an ellipse, over its other one
 
 
@@ -63,7 +64,7 @@ def fit_ellipses(rings: Sequence[Floats], tolerance: float) -> tuple[Bools, Floa
 
 
 def _conics(points: Floats, first: Ints, owner: Ints) -> tuple[Bools, Floats]:
-    """Fit conics A x^2 + B xy + C y^2 + D x + E y = 1 to points, as ``portable.linear.lstsq`` would.
+    """Fit conics A x^2 + B xy + C y^2 + D x + E y = 1 to points by orthogonalising its columns.
 
     Args:
         points: Of all outlines, shape (point, 2).

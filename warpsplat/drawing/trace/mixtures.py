@@ -14,7 +14,7 @@ DIRECTIONS = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 
 """Steps (row, column) along which neighbouring regions are looked for."""
 
 REACH = 3  # [px] how far
-CHUNK = 1 << 16  # pixels handled at once, which bounds the memory
+CHUNK = 1 << 14  # pixels handled at once, which bounds the memory
 DISTANCE_COST = 0.5  # [levels] what a pixel of distance to a region counts against it
 RESIDUAL_WEIGHT = 0.01  # keeps an order among mixtures whose residual is within the slack
 SLACK = 0.2  # how far a mixture may be off for free in a noisy image, over the difference of its colours:

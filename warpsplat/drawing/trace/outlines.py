@@ -71,23 +71,23 @@ def _offsets(loops: Loops, regions: Regions) -> Floats:
 def _intrusion(regions: Regions, start: Ints, step: Ints, mine: Floats, theirs: Floats) -> Floats:
     """Return how far the colours ``mine`` reach into the other region, from ``start`` on [px]."""
     height, width = regions.labels.shape
-    between = mine - theirs
-    square = np.maximum((between.astype(np.float64) ** 2).sum(axis=1), 1e-6)
-    total = np.zeros(len(start))
+    # Channel by channel: sums along an axis of four take ten times as long.
+    theirs, between = np.ascontiguousarray(theirs.T), np.ascontiguousarray((mine - theirs).T)
+    square = np.maximum((between.astype(np.float64) ** 2).sum(axis=0), 1e-6)
     label = regions.labels[start[:, 1], start[:, 0]]
-    active = np.ones(len(start), np.bool_)
-    before = np.full(len(start), 1.0)
+    total, before, going = np.zeros(len(start)), np.ones(len(start)), np.arange(len(start))
     for reach in range(REACH):
-        at = start + reach * step
-        active &= ((at >= 0) & (at < [width, height])).all(axis=1)
-        x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
-        active &= regions.labels[y, x] == label
-        away = regions.image[y, x] - theirs
-        share = np.clip((away * between).sum(axis=1) / square, 0, 1)
-        off = np.abs(away - share[:, None] * between).max(axis=1)
-        active &= (share <= before + PURE) & (share > PURE) & (off < FOREIGN)
-        total += np.where(active, share, 0)
-        before = share
+        x, y = (start[going] + reach * step[going]).T
+        inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        going, x, y = going[inside], x[inside], y[inside]
+        away, toward = regions.image[y, x].T - theirs[:, going], between[:, going]
+        share = np.clip((away * toward).sum(axis=0) / square[going], 0, 1)
+        off = np.abs(away - share * toward).max(axis=0)
+        mixed = (share <= before[going] + PURE) & (share > PURE) & (off < FOREIGN)
+        mixed &= regions.labels[y, x] == label[going]
+        going = going[mixed]
+        total[going] += share[mixed]
+        before[going] = share[mixed]
     return total
 
 

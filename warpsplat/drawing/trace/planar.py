@@ -128,13 +128,14 @@ def _assembled(width: int, keys: Ints, following: Ints, regions: Ints, others: I
     walk: list[int] = []
     first = [0]
     for start in range(len(after)):
+        if seen[start]:
+            continue
         crack = start
         while not seen[crack]:
             seen[crack] = 1
             walk.append(crack)
             crack = after[crack]
-        if len(walk) > first[-1]:
-            first.append(len(walk))
+        first.append(len(walk))
     index, starts = order[walk], np.asarray(first, np.intp)
     vertex, direction = keys[index] // 4, keys[index] % 4
     vertices = np.stack([vertex % (width + 1), vertex // (width + 1)], axis=1)
