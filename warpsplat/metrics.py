@@ -215,7 +215,8 @@ def score_svg(
     """
     height, width = target.shape[:2]
     shown = draw(text, width, height, stop, own=own)
-    paper = max(_papers(target), key=lambda level: _error(shown, target, level))
+    papers = _papers(target)
+    paper = papers[0] if len(papers) == 1 else max(papers, key=lambda level: _error(shown, target, level))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check_stop(stop)
     perceptual = perceptual and height * width <= SSIMULACRA2_PIXELS

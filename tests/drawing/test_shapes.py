@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import BLUE, GOLD, RED, ROUND, WHITE, Outline, disc, drawing, polygon, rounded
+from tests.drawing.drawings import (
+    BLUE,
+    GOLD,
+    RED,
+    ROUND,
+    WHITE,
+    Outline,
+    disc,
+    drawing,
+    polygon,
+    rounded,
+    star,
+)
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.shapes import merge_near
 from warpsplat.drawing.tidy import finish_drawing
@@ -14,6 +26,7 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas
 from warpsplat.svg.primitives import Primitive, primitives
+from warpsplat.svg.write import write_svg
 
 CANVAS = Canvas(80, 56, WHITE)
 
@@ -66,3 +79,18 @@ def test_near_values_are_merged_by_their_weights() -> None:
     values, counts = merge_near(np.array([3.0, 1.0, 1.2, 9.0]), np.array([1.0, 3.0, 1.0, 1.0]), 0.1)
     np.testing.assert_allclose(values, [3, 1.05, 1.05, 9])
     assert counts.tolist() == [1, 2, 2, 1]
+
+
+def test_equal_outlines_of_a_noisy_image_are_equal() -> None:
+    """Only where it is asked for; one that differs stays."""
+    places = [(14.3, 14.1), (38.6, 13.7), (63.2, 14.4), (14.8, 41.2), (38.1, 40.6)]
+    outlines = [*(star(x, y, 10, 4) for x, y in places), star(63, 41, 9, 5)]
+    scene = drawing(CANVAS, (RED, outlines)).scene
+    backend = Backend.on("cpu")
+    target = render(scene, backend=backend)
+    target = (target + np.random.default_rng(0).normal(0, 8 / 255, target.shape)).astype(np.float32)
+    for symbols in (False, True):
+        made = drawing(CANVAS, (RED, outlines), spread=0.2)
+        done = finish_drawing(target, made, Run(backend), symbols=symbols)
+        text = write_svg(done.drawing.scene, per_pixel=done.per_pixel, symbols=symbols)
+        assert text.count("<use ") == (5 if symbols else 0)

@@ -24,7 +24,9 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
     parts = run.open_parts(share=0.5 if limit else 1.0)
-    finish = partial(finish_drawing, original(problem.target), finest=finest(settings))
+    finish = partial(
+        finish_drawing, original(problem.target), finest=finest(settings), symbols=settings.symbols
+    )
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
         sketch = _sketch(problem, run, done)

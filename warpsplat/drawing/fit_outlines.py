@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats
-from warpsplat.drawing.measure import Measure, Samples
+from warpsplat.drawing.measure import Measure, Samples, is_shaded
 from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
 from warpsplat.rendering.renderer import Capacity, render
-from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 
 STEPS = 12
 """Most steps of a refinement."""
@@ -31,8 +31,44 @@ RAISED, WILDER, MOST_DAMPING = 3.0, 8.0, 100.0
 MOST_STEP = 0.7
 """How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
+FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
+"""First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
+
 LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
+
+
+class Paints:
+    """Fits the places of gradients by the signs of derivatives (Rprop, Riedmiller and Braun 1993)."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.best = scene.frames.astype(np.float64)
+        self._frames, self._last = self.best.copy(), np.zeros_like(self.best)
+        self._step = np.full_like(self.best, FRAME_STEP)
+        along, across = self.best[:, 2:4], self.best[:, 4:]
+        self._round = (scene.paint == Paint.RADIAL) & (across == turned(along)).all(axis=1)
+
+    def moved(self, gradient: Floats) -> Floats:
+        """Return the frames after a step."""
+        gradient = gradient.copy()
+        # Of a circle the second axis follows the first.
+        gradient[self._round, 2:4] -= turned(gradient[self._round, 4:])
+        gradient[self._round, 4:] = 0
+        agrees = gradient * self._last
+        self._step *= np.where(agrees > 0, FASTER, np.where(agrees < 0, SLOWER, 1.0))
+        self._last = gradient
+        self._frames = self._frames - np.sign(gradient) * self._step
+        self._frames[self._round, 4:] = turned(self._frames[self._round, 2:4])
+        return self._frames
+
+    def keep(self) -> None:
+        """Note the frames of the last step as the best."""
+        self.best = self._frames
+
+
+def turned(vectors: Floats) -> Floats:
+    """Return vectors turned by a right angle, shape (vector, 2)."""
+    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
 
 
 class OutlineFit:
@@ -64,6 +100,7 @@ class OutlineFit:
         self._measure = Measure(target, drawing, self.points, run.backend, capacity)
         self.error, self._around = self._measure.error(self.points)
         self._measure.look()
+        self._paints = Paints(drawing.scene) if is_shaded(drawing.scene).any() else None
 
     @property
     def drawing(self) -> Drawing:
@@ -71,7 +108,8 @@ class OutlineFit:
         return replace(self._drawing, scene=self._scene())
 
     def _scene(self) -> Scene:
-        return replace(self._drawing.scene, points=self.points.astype(np.float32))
+        scene = replace(self._drawing.scene, points=self.points.astype(np.float32))
+        return replace(scene, frames=self._paints.best.astype(np.float32)) if self._paints else scene
 
     @property
     def capacity(self) -> Capacity:
@@ -101,6 +139,8 @@ class OutlineFit:
         damping = np.full(len(self._following), DAMPING)
         for done in range(1, steps + 1):
             gradient = self._measure.gradient()
+            if self._paints:
+                self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0:
                 self._measure.look()
             freedom = self._constraints.freedom(at)
@@ -115,10 +155,14 @@ class OutlineFit:
             idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
                 self.points, self.error, self._around = at, error, now
+                if self._paints:
+                    self._paints.keep()
             if run.on_progress:
                 run.report(self._progress(done, steps, time.monotonic() - run.started))
             if idle >= MOST_IDLE or run.over():
                 break
+        if self._paints:
+            self._measure.paint(self._paints.best)
 
     def _progress(self, done: int, steps: int, seconds: float) -> Progress:
         scene = self._scene()

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing, Floats, Links, summed, with_ends
@@ -20,7 +21,7 @@ from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import TILE, to_tiles
-from warpsplat.scene import FloatArray
+from warpsplat.scene import GRADIENTS, FloatArray, Scene
 
 GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
 """Where on a piece of an outline samples lie, with equal weights: exact for cubic functions."""
@@ -62,6 +63,11 @@ def bernstein(t: Floats) -> Floats:
     return np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=-1)
 
 
+def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
+    """Return which shapes have gradients, shape (shape,)."""
+    return np.isin(scene.paint, GRADIENTS)
+
+
 def slopes_at(cubics: Floats, t: Floats) -> Floats:
     """Return the derivatives by ``t`` of cubics, shape (sample, 4, 2), at ``t``, shape (sample,)."""
     legs, s, u = 3 * np.diff(cubics, axis=1), (1 - t)[:, None], t[:, None]
@@ -93,8 +99,14 @@ class Surroundings:
         inside = (x >= 0) & (x < viewport.width) & (y >= 0) & (y < viewport.height)
         near, x, y = near[inside], x[inside], y[inside]
         self._cubic, self._count = near // (wide * high), len(cubics)
-        tile = np.searchsorted(self.tiles, y // TILE * viewport.tiles_x + x // TILE)
-        self._pixel = (tile * TILE + x % TILE) * TILE + y % TILE
+        self._tile = y // TILE * viewport.tiles_x + x // TILE
+        self._place = x % TILE * TILE + y % TILE
+        self.follow(self.tiles)
+
+    def follow(self, tiles: Links) -> None:
+        """Take ``tiles``, ascending, with those around the cubics."""
+        self.tiles = tiles
+        self._pixel = np.searchsorted(tiles, self._tile) * TILE * TILE + self._place
 
     def sums(self, pixels: FloatArray) -> Floats:
         """Return sums of ``pixels`` of ``tiles`` around each cubic, shape (cubic,)."""
@@ -122,6 +134,8 @@ class Measure:
         self.least = LEAST_CONTRAST * self._scale
         """Curvature that does not count."""
         self._near = Surroundings(with_ends(points, self._following), viewport)
+        if is_shaded(drawing.scene).any():
+            self._near.follow(np.arange(viewport.tile_count))
         self._tiles = self._near.tiles
         goal = to_tiles(target)
         self._target = goal[self._tiles]
@@ -138,6 +152,14 @@ class Measure:
     def capacity(self) -> Capacity:
         """Capacity of the renderer's arrays."""
         return self._renderer.capacity
+
+    def paint(self, frames: Floats) -> None:
+        """Place the gradients of shapes."""
+        self._parameters.groups["frames"].value.assign(frames.astype(np.float32))
+
+    def frames_gradient(self) -> Floats:
+        """Return the derivative of the last ``gradient``'s error by the frames, shape (shape, 6)."""
+        return self._parameters.groups["frames"].grad.numpy().astype(np.float64)
 
     def _render(self, points: Floats) -> None:
         self._parameters.groups["points"].value.assign(points.astype(np.float32))

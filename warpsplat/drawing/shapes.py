@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
-from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing
+from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, summed
 from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
 from warpsplat.drawing.trace.curves import Pieces
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.primitives import Primitive
 
@@ -27,7 +28,8 @@ Floats = npt.NDArray[np.float64]
 MOST_PIECES = 24
 """Outlines of more pieces are no basic shapes."""
 
-SAMPLES_PER_PIECE = 12
+SAMPLES = 96
+"""Points by which an outline is compared with a shape."""
 
 MOST_OFF = 0.6
 """Largest distance of an outline from its basic shape [px]."""
@@ -91,7 +93,7 @@ def with_shapes(
         errors: Those of the drawing.
         worth: Mean squared error that a byte is worth.
     """
-    left = with_equal_values(_candidates(target, drawing.scene, worth), worth)
+    left = with_equal_values(_candidates(target, drawing, worth), worth)
     for _ in range(CHECKS):
         if not left:
             break
@@ -104,33 +106,45 @@ def with_shapes(
     return drawing
 
 
-def _candidates(target: FloatArray, scene: Scene, worth: float) -> list[Candidate]:
+def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Candidate]:
     """Return the basic shape of each contour that is near to one, the cheapest by error and bytes."""
+    scene = drawing.scene
+    pieces = np.diff(scene.starts) // 3
+    contours = np.flatnonzero((pieces >= 2) & (pieces <= MOST_PIECES))
+    if not len(contours):
+        return []
+    samples, is_likely = _samples(target, _points_along(scene, contours))
+    samples = Samples(samples.points[is_likely], samples.weights[is_likely])
+    contours = contours[is_likely]
+    if not len(contours):
+        return []
+    areas, sizes = _areas(samples.points), _sizes(drawing)[contours]
+    made = [nearest(family, samples) for family in FAMILIES]
+    costs = np.stack([_costs(f, fits, samples, areas, worth) for f, fits in zip(FAMILIES, made, strict=True)])
+    best = costs.argmin(axis=0)
     found = []
-    for group in scene.alike():
-        pieces = group.points.shape[1] // 3
-        if not 2 <= pieces <= MOST_PIECES:
-            continue
-        ring = np.concatenate([group.points, group.points[:, :1]], axis=1).astype(np.float64)
-        cubics = ring[:, 3 * np.arange(pieces)[:, None] + np.arange(4)]
-        samples, is_likely = _samples(target, cubics)
-        likely = np.flatnonzero(is_likely)
-        if not len(likely):
-            continue
-        samples, cubics = Samples(samples.points[likely], samples.weights[likely]), cubics[likely]
-        areas, sizes = _areas(samples.points), _sizes(cubics)
-        made = [nearest(family, samples) for family in FAMILIES]
-        costs = np.stack(
-            [_costs(f, fits, samples, areas, worth) for f, fits in zip(FAMILIES, made, strict=True)]
-        )
-        best = costs.argmin(axis=0)
-        for i in np.flatnonzero(np.isfinite(costs.min(axis=0))).tolist():
-            family, fits = FAMILIES[best[i]], made[best[i]]
-            saved = float(sizes[i]) - family.size
-            own = int(group.contours[likely[i]])
-            values = fits.values[i], fits.stiffness[i]
-            found.append(Candidate(own, cubics[i], family, *values, bool(areas[i] > 0), saved))
+    for i in np.flatnonzero(np.isfinite(costs.min(axis=0))).tolist():
+        contour, family, fits = int(contours[i]), FAMILIES[best[i]], made[best[i]]
+        values, saved = (fits.values[i], fits.stiffness[i]), float(sizes[i]) - family.size
+        cubics = cubics_of(scene, contour)
+        found.append(Candidate(contour, cubics, family, *values, bool(areas[i] > 0), saved))
     return found
+
+
+def cubics_of(scene: Scene, contour: int) -> Floats:
+    """Return the pieces of a contour, shape (piece, 4, 2)."""
+    ring = scene.points[scene.starts[contour] : scene.starts[contour + 1]].astype(np.float64)
+    return np.concatenate([ring, ring[:1]])[np.arange(0, len(ring), 3)[:, None] + np.arange(4)]
+
+
+def _points_along(scene: Scene, contours: IndexArray) -> Floats:
+    """Return equally many points of contours, shape (contour, sample, 2), as many on each piece of one."""
+    first, count = scene.starts[contours, None], np.diff(scene.starts)[contours, None]
+    place = (np.arange(SAMPLES) + 0.5) / SAMPLES * (count / 3)
+    piece = np.floor(place).astype(np.intp)
+    rows = first[..., None] + (3 * piece[..., None] + np.arange(4)) % count[..., None]
+    cubics = scene.points[rows].astype(np.float64)
+    return np.asarray(points_at(cubics, (place - piece)[..., None])[..., 0, :])
 
 
 def with_equal_values(candidates: list[Candidate], worth: float) -> list[Candidate]:
@@ -184,14 +198,12 @@ def merge_near(values: Floats, stiffness: Floats, price: float) -> tuple[Floats,
     return found, counts
 
 
-def _samples(target: FloatArray, cubics: Floats) -> tuple[Samples, npt.NDArray[np.bool_]]:
+def _samples(target: FloatArray, points: Floats) -> tuple[Samples, npt.NDArray[np.bool_]]:
     """Return points of contours with their weights, and which of the contours mostly show.
 
     A distance of 1 px along 1 px costs the squared difference of the colours on both sides, as a share of the
-    image's mean squared error. ``cubics``: shape (contour, piece, 4, 2).
+    image's mean squared error.
     """
-    t = (np.arange(SAMPLES_PER_PIECE) + 0.5) / SAMPLES_PER_PIECE
-    points = np.asarray(points_at(cubics, t).reshape(len(cubics), -1, 2), np.float64)
     along = (np.roll(points, -1, axis=1) - np.roll(points, 1, axis=1)) / 2
     lengths = np.maximum(hypot(along[..., 0], along[..., 1]), 1e-9)
     normals = np.stack([-along[..., 1], along[..., 0]], axis=2) / lengths[..., None]
@@ -214,14 +226,13 @@ def _areas(points: Floats) -> Floats:
     return np.asarray((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2)
 
 
-def _sizes(cubics: Floats) -> Floats:
-    """Return about the bytes of contours (contour, piece, 4, 2)."""
-    chord = cubics[..., 3, :] - cubics[..., 0, :]
-    thirds = cubics[..., :1, :] + np.array([[1 / 3], [2 / 3]]) * chord[..., None, :]
-    is_line = np.abs(cubics[..., 1:3, :] - thirds).max(axis=(-1, -2)) < SAME_COORDINATE
-    is_level = is_line & (np.abs(chord).min(axis=-1) < SAME_COORDINATE)
-    size = np.where(is_level, LEVEL_BYTES, np.where(is_line, LINE_BYTES, CUBIC_BYTES))
-    return np.asarray(MOVE_BYTES + size.sum(axis=1))
+def _sizes(drawing: Drawing) -> Floats:
+    """Return about the bytes of each contour."""
+    cubics, starts = drawing.cubics(), drawing.scene.starts
+    is_level = np.abs(cubics[:, 3] - cubics[:, 0]).min(axis=1) < SAME_COORDINATE
+    size = np.where(drawing.lines(), np.where(is_level, LEVEL_BYTES, LINE_BYTES), CUBIC_BYTES)
+    owner = np.repeat(np.arange(len(starts) - 1), np.diff(starts) // 3)
+    return MOVE_BYTES + summed(owner, size, len(starts) - 1)
 
 
 def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: float) -> Floats:
@@ -237,16 +248,25 @@ def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: f
 
 def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     """Return a drawing with basic shapes in place of contours."""
+    contours = {}
+    for one in chosen:
+        cubics = one.made.cubics()
+        joints = joints_of([Pieces(cubics, _is_line(cubics))])
+        contours[one.contour] = cubics[:, :3].reshape(-1, 2), joints
+    return with_contours(drawing, contours)
+
+
+def with_contours(
+    drawing: Drawing, contours: Mapping[int, tuple[npt.NDArray[Any], npt.NDArray[Any]]]
+) -> Drawing:
+    """Return a drawing with other points and joints of some contours."""
     scene = drawing.scene
     starts = scene.starts.tolist()
     points = [scene.points[a:b] for a, b in pairwise(starts)]
     joints = [drawing.joints[a:b] for a, b in pairwise(starts)]
-    for one in chosen:
-        cubics = one.made.cubics()
-        points[one.contour] = cubics[:, :3].reshape(-1, 2).astype(np.float32)
-        joints[one.contour] = joints_of([Pieces(cubics, _is_line(cubics))]).astype(np.int32)
-    counts = np.array([len(own) for own in points], np.int32)
-    after = starts_of(counts)
+    for contour, (own_points, own_joints) in contours.items():
+        points[contour], joints[contour] = own_points.astype(np.float32), own_joints.astype(np.int32)
+    after = starts_of(np.array([len(own) for own in points], np.int32))
     first = after[np.searchsorted(scene.starts, scene.first)]
     changed = replace(scene, points=np.concatenate(points), starts=after, first=first)
     return Drawing(changed, np.concatenate(joints))

@@ -11,13 +11,14 @@ from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
 from warpsplat.drawing.constraints import Constraints, Drawing, Floats, summed
+from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import STAGED_COST, byte_worth
 from warpsplat.portable import elementary
-from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
@@ -67,6 +68,7 @@ def finish_drawing(
     finest: float = GRIDS[-1],
     tidy: bool = True,
     price: float = 1.0,
+    symbols: bool = False,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -78,6 +80,7 @@ def finish_drawing(
         finest: most view box units per pixel.
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
+        symbols: whether nearly equal outlines become equal.
     """
     target = matching(target, drawing.scene.canvas)
     if not len(drawing.scene):
@@ -87,35 +90,47 @@ def finish_drawing(
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
         fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+    equal: list[Equal] = []
     if tidy:
-        exact = with_exact_shapes(target, fit.drawing, run.backend, price)
-        if exact is not None:
+        fitted = fit.drawing
+        exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
+        if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
     grid = drawing_grid(fit, finest, price)
-    low = rounded(fit.drawing.scene, grid)
-    held = held_rounds(low, grid)
+    low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
+    held |= held_rounds(low, grid)
     held[::3] = True
     fit.hold(np.where(held[:, None], low.points, fit.points), held)
     fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
     drawing = fit.drawing
-    return Finished(replace(drawing, scene=rounded(drawing.scene, grid)), grid)
+    low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
+    return Finished(replace(drawing, scene=low), grid)
 
 
-def with_exact_shapes(target: FloatArray, drawing: Drawing, backend: Backend, price: float) -> Drawing | None:
-    """Return a drawing with exact basic shapes (``with_shapes``); None: there are none."""
+def with_exact_shapes(
+    target: FloatArray, drawing: Drawing, run: Run, price: float, *, symbols: bool
+) -> tuple[Drawing, list[Equal]]:
+    """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
 
     def errors_of(made: Drawing) -> Floats:
         points = Constraints(made).project(made.cubics()[:, :3].reshape(-1, 2))
         scene = replace(made.scene, points=points.astype(np.float32))
-        away = squares(render(scene, backend=backend) - target)
+        away = squares(render(scene, backend=run.backend) - target)
         viewport = Viewport(target.shape[1], target.shape[0])
         return by_cell(to_tiles(away[..., None])[:, 0], viewport) / (3 * viewport.pixel_count)
+
+    def refit(made: Drawing) -> Drawing:
+        fit = OutlineFit(target, made, run)
+        fit.advance(replace(run, on_progress=None), SECOND_STEPS)
+        return fit.drawing
 
     errors = errors_of(drawing)
     size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
     worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
-    made = with_shapes(target, drawing, errors_of, errors, worth)
-    return None if made is drawing else made
+    exact = with_shapes(target, drawing, errors_of, errors, worth)
+    if not symbols:
+        return exact, []
+    return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
 
 
 def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:

@@ -24,6 +24,7 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
         opacity_scale=renderer.opacity_scale,
         title=settings.title,
         ids=settings.ids,
+        symbols=settings.symbols,
     )
 
 

@@ -236,6 +236,9 @@ class Settings:
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
+    symbols: bool = option(
+        False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
+    )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )

@@ -45,3 +45,4 @@ class Options(RefineOptions, total=False):
     size: str | None
     page: str | None
     units: str | None
+    symbols: bool | None

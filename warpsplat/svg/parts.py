@@ -39,7 +39,7 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
         own = parts[shape][0]
         pad = 0.5 * (MARGIN + float(scene.widths[shape]))
         parts[shape] = [own[part] for part in _packed(_clusters(boxes[own], pad), nodes[own], most)]
-    return _with_parts(scene, parts)
+    return with_parts(scene, parts)
 
 
 def _clusters(boxes: FloatArray, pad: float) -> list[list[int]]:
@@ -68,7 +68,7 @@ def _packed(clusters: list[list[int]], nodes: IndexArray, most: int) -> list[lis
     return parts
 
 
-def _with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
+def with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
     """Return ``scene`` with shapes split into ``parts``: lists of contours, by shape."""
     split = scene.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
     order = [part for own in parts for part in own]

@@ -23,6 +23,7 @@ from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.paints import SHARE_DECIMALS, gradients
 from warpsplat.svg.parts import in_parts
 from warpsplat.svg.primitives import primitives
+from warpsplat.svg.symbols import with_symbols
 
 OPACITY_DECIMALS = 2
 """Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
@@ -78,11 +79,26 @@ BLACK_FILL = ' fill="#000"'
 class _Paths:
     """The path elements of a scene's shapes."""
 
-    def __init__(self, scene: Scene, per_pixel: float, ramps: dict[int, str], opacity_scale: float) -> None:
-        """``ramps``: identifiers of gradients by shape; the rest is as for ``write_svg``."""
+    def __init__(
+        self,
+        scene: Scene,
+        per_pixel: float,
+        ramps: dict[int, str],
+        opacity_scale: float,
+        symbols: dict[int, str] | None = None,
+    ) -> None:
+        """Write the path data.
+
+        Args:
+            scene: As for ``write_svg``.
+            per_pixel: The same.
+            ramps: Identifiers of gradients by shape.
+            opacity_scale: As for ``write_svg``.
+            symbols: Elements without style, by shape, instead of paths.
+        """
         self._scene, self._per_pixel = scene, per_pixel
         self._data = list(path_data(scene, per_pixel))
-        self._elements = _basic_shapes(scene, per_pixel)
+        self._elements = _basic_shapes(scene, per_pixel) | (symbols or {})
         self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
@@ -240,6 +256,7 @@ def write_svg(
     background: bool = True,
     title: str = "",
     ids: bool = False,
+    symbols: bool = False,
 ) -> str:
     """Return the scene as an SVG: a background and, in painter's order, one path for each shape.
 
@@ -254,6 +271,7 @@ def write_svg(
         background: Whether to write the canvas's background.
         title: Title of the picture; empty: none.
         ids: Whether paths, and groups of neighbours of one colour, have identifiers after their colours.
+        symbols: Whether equal outlines are written once.
 
     Raises:
         UsageError: A number of the scene is not finite.
@@ -266,9 +284,10 @@ def write_svg(
     if background and canvas.background is not None:
         paint = f' fill="{hex_colors(canvas.background[None])[0]}"'.replace(BLACK_FILL, "")
         behind = f'<rect width="{width}" height="{height}"{paint}/>'
+    scene, outlines, uses = with_symbols(scene, per_pixel) if symbols else (scene, "", {})
     elements, ramps = gradients(scene, per_pixel)
-    defs = f"<defs>{''.join(elements)}</defs>" if elements else ""
-    paths = _Paths(scene, per_pixel, ramps, opacity_scale)
+    defs = f"<defs>{''.join(elements)}{outlines}</defs>" if elements or outlines else ""
+    paths = _Paths(scene, per_pixel, ramps, opacity_scale, uses)
     shapes = "".join(_groups(scene, paths, per_pixel, ids))
     if canvas.crisp and len(scene):
         shapes = f'<g shape-rendering="crispEdges">{shapes}</g>'

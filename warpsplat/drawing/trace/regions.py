@@ -40,6 +40,8 @@ class Regions:
     colorings: list[Coloring]
     noise: float
     """How much flat regions vary [levels]."""
+    scale: int = 1
+    """Pixels along one of the image."""
 
 
 def find_regions(image: Floats) -> Regions:

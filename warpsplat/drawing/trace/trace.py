@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import Layers, find_outlines
+from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
@@ -68,6 +69,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
         regions: Of an image.
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
     """
+    regions = with_sub_pixels(regions)
     loops = find_loops(regions.labels, regions.image)
     boundary = find_boundary(loops, regions)
     tree = find_tree(loops, len(regions.paint))
@@ -79,7 +81,7 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     cover = Cover(hiding[regions.labels])
     outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
-    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions.noise)))
+    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
     found = [
         (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
         for region, outline in outlines
@@ -89,28 +91,31 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     joined = with_joined_lines([contour for _, contour in known])
     for (region, _), contour in zip(known, joined, strict=True):
         if len(contour.cubics) > 1:
-            contours.setdefault(region, []).append(contour)
+            contours.setdefault(region, []).append(replace(contour, cubics=contour.cubics / regions.scale))
     shapes = [
         Fill(regions.colorings[regions.paint[region]], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
     ]
-    height, width = regions.labels.shape
+    height, width = (side // regions.scale for side in regions.labels.shape)
     background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
     return _scene(Canvas(width, height, background), merged(shapes))
 
 
 TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve
 STAIRCASE_TOLERANCE = 0.62  # [px] the same without antialiasing: steps are half a pixel off
+SUB_PIXEL_TOLERANCE = 0.14  # [px] the same of one of sub-pixels
 NOISE_TOLERANCE = 0.02  # [px] that a level of noise adds
 
 
-def tolerance_of(offsets: Floats, loops: Loops, noise: float) -> float:
-    """Return how near curves must follow the boundary [px]; without antialiasing it is a staircase."""
+def tolerance_of(offsets: Floats, loops: Loops, regions: Regions) -> float:
+    """Return how near curves must follow the boundary; without antialiasing it is a staircase."""
+    if regions.scale > 1:
+        return regions.scale * SUB_PIXEL_TOLERANCE
     inner = loops.others >= 0
     moved = np.abs(offsets[inner]) > 0.03
     if not len(moved):
         return TOLERANCE
-    return (STAIRCASE_TOLERANCE if moved.mean() < 0.1 else TOLERANCE) + NOISE_TOLERANCE * noise
+    return (STAIRCASE_TOLERANCE if moved.mean() < 0.1 else TOLERANCE) + NOISE_TOLERANCE * regions.noise
 
 
 def _ground(regions: Regions, tree: Tree, *, may_have_ground: bool) -> tuple[Bools, Coloring | None]:

@@ -1,0 +1,58 @@
+"""Thin lines and small letters, which have pixels of no pure colour."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.drawing.trace.drawings import draw_exactly, ground, levels
+from warpsplat.drawing.trace.regions import Regions, find_regions
+from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray
+
+LETTERS = (
+    '<g fill="none" stroke="#113366" stroke-width="1.1">'
+    '<circle cx="6.3" cy="9.2" r="2.4"/><circle cx="14.6" cy="9.4" r="2.2"/>'
+    '<path d="M20.4 6.5v5.2M24.7 6.5v5.2M29.3 3.2v8.5"/></g>'
+    '<circle cx="20.4" cy="4.1" r="0.8" fill="#113366"/><circle cx="24.7" cy="4.1" r="0.8" fill="#113366"/>'
+)
+"""Two letters "o", two "i" and an "l", 12 px high."""
+
+
+@pytest.fixture(scope="module")
+def letters() -> FloatArray:
+    return draw_exactly(ground("#ffffff", 36, 16) + LETTERS, 36, 16)
+
+
+@pytest.fixture(scope="module")
+def small(letters: FloatArray) -> Regions:
+    return with_sub_pixels(find_regions(levels(letters)))
+
+
+def test_sub_pixels_have_the_area_of_their_pixel(letters: FloatArray, small: Regions) -> None:
+    scale = small.scale
+    assert scale == 4
+    shown = small.fills.reshape(16, scale, 36, scale, 4).mean(axis=(1, 3))
+    off = np.abs(shown - levels(letters)).max(axis=2)
+    assert off.max() <= 255 * 0.1 and off.mean() <= 255 * 0.01
+
+
+def test_letters_have_one_ink_their_counters_and_their_dots(small: Regions) -> None:
+    assert len(np.unique(small.paint)) == 2
+    # The paper, two counters; two rings, two stems with a dot each, and the "l".
+    assert len(small.paint) == 1 + 2 + 2 + 4 + 1
+
+
+def test_a_trace_of_small_letters_is_near_their_source_at_four_times_the_size(letters: FloatArray) -> None:
+    large = draw_exactly(f'<g transform="scale(4)">{ground("#ffffff", 36, 16)}{LETTERS}</g>', 144, 64)
+    shown = render(trace(letters).scene, scale=4)
+    assert -10 * np.log10(((shown - large) ** 2).mean()) > 23
+
+
+def test_broad_shapes_keep_their_pixels() -> None:
+    image = draw_exactly(
+        ground("#ffffff", 40, 40) + '<circle cx="20" cy="20" r="12.3" fill="#a02030"/>', 40, 40
+    )
+    assert with_sub_pixels(find_regions(levels(image))).scale == 1

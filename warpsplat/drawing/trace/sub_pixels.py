@@ -1,0 +1,174 @@
+"""Sub-pixel mapping: regions at several times the resolution, of the same area in each pixel.
+
+A pixel of a thin line or a small letter is a mixture of two colours in known shares. Its sub-pixels are given
+to the two in these proportions, each to the colour that it has more of around it (Atkinson 1997, "Mapping
+sub-pixel boundaries from remotely sensed images").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpsplat.drawing.trace.grids import Floats, Ints, components, dilated
+from warpsplat.drawing.trace.inks import with_inks
+from warpsplat.drawing.trace.mixtures import DISTANCE_COST, MIXED
+from warpsplat.drawing.trace.regions import Regions
+from warpsplat.portable import elementary, filters
+
+SCALES = (4, 3, 2)
+MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
+FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
+MOST_COLORS = 32  # that are compared by pairs
+THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
+NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
+PURE = 0.04  # share up to which a colour is no part of a pixel
+SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
+WEIGHT = 256  # that stands for 1 where weights are whole numbers
+SWEEPS = 4  # in which sub-pixels change places
+
+
+@dataclass(frozen=True)
+class _Mixed:
+    """Pixels as mixtures of two colourings."""
+
+    rows: Ints
+    columns: Ints
+    first: Ints
+    """Number of the one colouring, shape (pixel,)."""
+    second: Ints
+    share: Floats
+    """Of the first one, shape (pixel,)."""
+
+
+def with_sub_pixels(regions: Regions) -> Regions:
+    """Return the regions at several times the resolution if many of them are thin."""
+    height, width = regions.labels.shape
+    scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
+    used = np.unique(regions.paint).tolist()
+    is_flat = all(regions.colorings[k].ramp is None for k in used)
+    if scale == 1 or regions.noise or not is_flat or len(used) > MOST_COLORS:
+        return regions
+    inked = with_inks(regions)
+    colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
+    painted, mixed = _unmixed(inked, colors)
+    if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
+        return regions
+    small = _mapped(painted, mixed, scale)
+    fills = colors[small]
+    image = filters.box_blur(filters.box_blur(fills, 3), 3)
+    labels = components(small, image)
+    paint = np.zeros(int(labels.max()) + 1, np.int32)
+    paint[labels] = small
+    return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
+
+
+def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
+    """Return the colouring with the larger share in each pixel, and the mixed pixels; ``colors``: of all."""
+    painted = regions.paint[regions.labels]
+    numbers = np.unique(painted).tolist()
+    distances = {k: filters.distance(painted != k) for k in numbers}
+    cost = np.full(painted.shape, np.inf, np.float32)
+    first, second, share = painted.copy(), painted.copy(), np.ones(painted.shape, np.float32)
+    for i, a in enumerate(numbers):
+        for b in numbers[i + 1 :]:
+            rows, columns = np.nonzero((distances[a] < NEAR) & (distances[b] < NEAR))
+            between, away = colors[a] - colors[b], regions.image[rows, columns] - colors[b]
+            t = np.clip((away * between).sum(axis=1) / max(float((between**2).sum()), 1e-6), 0, 1)
+            off = np.abs(away - t[:, None] * between).max(axis=1, initial=0)
+            off += DISTANCE_COST * (distances[a] + distances[b])[rows, columns]
+            better = off < cost[rows, columns]
+            at = rows[better], columns[better]
+            cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
+    most = np.where(share >= 0.5, first, second)
+    is_pure = np.abs(regions.image - colors[most]).max(axis=2) <= MIXED
+    rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE) & ~is_pure)
+    at = rows, columns
+    return most, _Mixed(rows, columns, first[at], second[at], share[at])
+
+
+def _foreign_share(regions: Regions, mixed: _Mixed, colors: Floats) -> float:
+    """Return the share of the mixed pixels that are not mixed of two colours."""
+    share = mixed.share[:, None]
+    expected = share * colors[mixed.first] + (1 - share) * colors[mixed.second]
+    off = np.abs(regions.image[mixed.rows, mixed.columns] - expected).max(axis=1)
+    return float((off > MIXED).mean()) if len(off) else 0.0
+
+
+def _thin_share(painted: Ints, mixed: _Mixed) -> float:
+    """Return the share of the mixed pixels beside which one of the two colours covers no pixel altogether."""
+    pure = np.ones(painted.shape, np.bool_)
+    pure[mixed.rows, mixed.columns] = False
+    is_thin = np.zeros(len(mixed.rows), np.bool_)
+    for k in np.unique(painted).tolist():
+        lacks = ~dilated(pure & (painted == k), 3)[mixed.rows, mixed.columns]
+        is_thin |= lacks & ((mixed.first == k) | (mixed.second == k))
+    return float(is_thin.mean()) if len(is_thin) else 0.0
+
+
+def _mapped(painted: Ints, mixed: _Mixed, scale: int) -> Ints:
+    """Return the colouring of each sub-pixel, shape (scale height, scale width)."""
+    small = np.repeat(np.repeat(painted, scale, axis=0), scale, axis=1)
+    counts = np.round(mixed.share * scale**2).astype(np.int64)
+    kernel = _kernel(scale)
+    # At first all sub-pixels of a pixel are alike.
+    shares = np.repeat(np.repeat(_shares_around(painted, mixed), scale, axis=1), scale, axis=2)
+    start = _attraction(shares, kernel)
+    _give(small, mixed, np.arange(len(counts)), counts, start)
+    # Pixels change one after the other, so that neighbours do not swap for ever.
+    turns = 2 * (mixed.rows % 2) + mixed.columns % 2
+    for turn in [0, 1, 2, 3] * SWEEPS:
+        some = np.flatnonzero(turns == turn)
+        views = np.lib.stride_tricks.sliding_window_view(
+            np.pad(small, scale, mode="edge"), (3 * scale, 3 * scale)
+        )
+        around = views[mixed.rows[some] * scale, mixed.columns[some] * scale]
+        own, other = (around == each[some, None, None] for each in (mixed.first, mixed.second))
+        lead = _attraction(WEIGHT * (own.astype(np.int64) - other), kernel)
+        _give(small, mixed, some, counts[some], WEIGHT * lead + start[some])
+    return small
+
+
+def _shares_around(painted: Ints, mixed: _Mixed) -> Ints:
+    """Return how much more of the first colour than of the second the 3x3 pixels have, (pixel, 3, 3)."""
+    first, second = painted.copy(), painted.copy()
+    share = np.full(painted.shape, WEIGHT, np.int64)
+    at = mixed.rows, mixed.columns
+    first[at], second[at], share[at] = mixed.first, mixed.second, np.round(WEIGHT * mixed.share)
+    one, other, part = (
+        np.lib.stride_tricks.sliding_window_view(np.pad(each, 1, mode="edge"), (3, 3))[at]
+        for each in (first, second, share)
+    )
+
+    def of(wanted: Ints) -> Ints:
+        number = wanted[:, None, None]
+        return np.where(one == number, part, np.where(other == number, WEIGHT - part, 0))
+
+    return of(mixed.first) - of(mixed.second)
+
+
+def _kernel(scale: int) -> Ints:
+    """Return how much those around a pixel attract its sub-pixels, shape (scale, 3 scale)."""
+    away = (np.arange(3 * scale) - np.arange(scale)[:, None] - scale) / scale
+    return np.round(WEIGHT * elementary.exp(-0.5 * (away / SIGMA) ** 2)).astype(np.int64)
+
+
+def _attraction(windows: Ints, kernel: Ints) -> Ints:
+    """Return the weighted sums for the sub-pixels in the middle of windows, shape (window, sub-pixel)."""
+    places = range(kernel.shape[1])
+    down = np.sum([windows[:, i, None] * kernel[:, i, None] for i in places], axis=0)
+    across = np.sum([down[:, :, i, None] * kernel[:, i] for i in places], axis=0)
+    return np.asarray(across.reshape(len(windows), -1))
+
+
+def _give(small: Ints, mixed: _Mixed, some: Ints, counts: Ints, lead: Ints) -> None:
+    """Give the sub-pixels of ``some`` pixels where its ``lead`` is largest to the first colour."""
+    size = lead.shape[1]
+    scale = round(size**0.5)
+    order = np.argsort(-lead, axis=1, kind="stable")
+    first = np.empty(lead.shape, np.bool_)
+    np.put_along_axis(first, order, np.arange(size) < counts[:, None], axis=1)
+    down, right = np.divmod(np.arange(size), scale)
+    at = mixed.rows[some, None] * scale + down, mixed.columns[some, None] * scale + right
+    small[at] = np.where(first, mixed.first[some, None], mixed.second[some, None])
