@@ -57,6 +57,7 @@ NOISY = {
     "margin, JPEG": jpeg(bordered(scaled(sprite(), 6), 7, 9), 85),
     "interpolated": scaled(sprite(), 4, Image.Resampling.BILINEAR),
     "broken scale, interpolated": scaled(sprite(), 4.3, Image.Resampling.BILINEAR),
+    "antialiased": cv2.resize(scaled(sprite(), 27), None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA),
 }
 CLEAN = {
     "broken scale": scaled(sprite(), 1.5),

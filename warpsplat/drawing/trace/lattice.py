@@ -203,6 +203,9 @@ def _with_colors(levels: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Latt
     for _ in range(SHARPENINGS if soft else 0):
         colors = np.clip(colors + seen - at_centers(shown(colors)), 0, 255)
     error, variance = np.square(levels - shown(colors)), np.square(levels - levels.mean(axis=(0, 1)))
+    if not soft:
+        mixed = _averaged(_averaged(colors, down, height, 0), across, width, 1)
+        error = min(error, np.square(levels - mixed), key=np.sum)
     if error.sum() > (1 - (EXPLAINED_SOFT if soft else EXPLAINED)) * variance.sum():
         return None
     found = _numbered(colors, NOISES * float(np.sqrt(np.median(error))))
@@ -256,3 +259,15 @@ def _sampled(colors: Floats, borders: Floats, size: int, axis: int, *, soft: boo
     share = np.clip((places - centers[before]) / (centers[before + 1] - centers[before]), 0, 1)
     share = share.reshape([-1, 1, 1] if axis == 0 else [1, -1, 1])
     return (1 - share) * np.take(colors, before, axis=axis) + share * np.take(colors, before + 1, axis=axis)
+
+
+def _averaged(colors: Floats, borders: Floats, size: int, axis: int) -> Floats:
+    """Return the mean colours of pixels along one axis, as antialiased where cells end within."""
+    shape = [-1, 1, 1] if axis == 0 else [1, -1, 1]
+    places = np.arange(size + 1)
+    cells = np.minimum(np.searchsorted(borders, places, side="right") - 1, len(borders) - 2)
+    whole = colors * np.diff(borders).reshape(shape)
+    until = np.take(np.cumsum(whole, axis=axis) - whole, cells, axis=axis)
+    return np.diff(
+        until + (places - borders[cells]).reshape(shape) * np.take(colors, cells, axis=axis), axis=axis
+    )

@@ -7,6 +7,7 @@ sub-pixel boundaries from remotely sensed images").
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,7 +48,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     height, width = regions.labels.shape
     scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
     used = np.unique(regions.paint).tolist()
-    is_flat = all(regions.colorings[k].ramp is None for k in used)
+    is_flat = all(regions.colorings[k].ramp is None and not regions.colorings[k].is_band for k in used)
     if scale == 1 or regions.noise or not is_flat or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
@@ -159,13 +160,13 @@ def _attraction(windows: Ints, kernel: Ints) -> Ints:
     places = range(kernel.shape[1])
     down = np.sum([windows[:, i, None] * kernel[:, i, None] for i in places], axis=0)
     across = np.sum([down[:, :, i, None] * kernel[:, i] for i in places], axis=0)
-    return np.asarray(across.reshape(len(windows), -1))
+    return np.asarray(across.reshape(len(windows), len(kernel) * len(kernel)))
 
 
 def _give(small: Ints, mixed: _Mixed, some: Ints, counts: Ints, lead: Ints) -> None:
     """Give the sub-pixels of ``some`` pixels where its ``lead`` is largest to the first colour."""
     size = lead.shape[1]
-    scale = round(size**0.5)
+    scale = math.isqrt(size)
     order = np.argsort(-lead, axis=1, kind="stable")
     first = np.empty(lead.shape, np.bool_)
     np.put_along_axis(first, order, np.arange(size) < counts[:, None], axis=1)

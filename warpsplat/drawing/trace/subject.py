@@ -57,7 +57,7 @@ INSIDE, LEAST_INSIDE = (
 GRAINY = 0.02  # share of pixels that are paper or away from edges, below which those edges are grain
 FEW, FLAT, CONTRAST, NEEDED = 8.7, 8.9, 2.5, 24.3
 """Weights of the evidence for a drawing, and its least sum: by logistic regression on 1,100 pictures."""
-EVEN = 0.95  # share of evenly changing pixels, edges aside, above which an image is a drawing
+EVEN = 0.97  # share of evenly changing pixels, edges aside, above which an image is a drawing
 LEAST_CONTRAST = 4.0  # [stops] below which an image is not less of a drawing
 
 
@@ -82,7 +82,7 @@ def _guess(image: FloatArray) -> Guess:
     if inside.mean() < LEAST_INSIDE:
         inside[:] = True
     if _evenness(part, inside & ~dilated(edges, 3)) > EVEN:
-        return Guess("drawing", "it is evenly shaded")
+        return Guess("drawing", "apart from edges it is flat or evenly shaded")
     few = _few_colors(part, inside if is_grainy else inside & ~edges, blurs=1 + is_grainy)
     flat = float((step[inside] == 0).mean())
     contrast = max(LEAST_CONTRAST, _contrast(part[_densest(np.minimum(step, 2 * EDGE))]))
