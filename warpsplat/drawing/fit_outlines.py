@@ -34,6 +34,10 @@ MOST_STEP = 0.7
 FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
 """First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
 
+import os
+OVER=float(os.environ.get('OVER','1'))
+BLURS=int(os.environ.get('BLURS','0'))
+OVERS=int(os.environ.get('OVERS','8'))
 LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
 
@@ -128,6 +132,7 @@ class OutlineFit:
 
     def hold(self, points: Floats, held: Flags) -> None:
         """Begin again at ``points``; those that are ``held``, shape (point,), stay there from now on."""
+        points = self._constraints.shared(points)
         drawing = replace(self._drawing, scene=replace(self._drawing.scene, points=points.astype(np.float32)))
         self._constraints = Constraints(drawing, held)
         self.points = self._constraints.project(points)
@@ -138,7 +143,7 @@ class OutlineFit:
         at, around, idle = self.points, self._around, 0
         damping = np.full(len(self._following), DAMPING)
         for done in range(1, steps + 1):
-            gradient = self._measure.gradient()
+            gradient = self._measure.gradient(blurred=done <= BLURS)
             if self._paints:
                 self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0:
@@ -146,6 +151,7 @@ class OutlineFit:
             freedom = self._constraints.freedom(at)
             bending = Bending(self._measure.samples(at), self._following)
             change = newton_step(bending, freedom, gradient, damping, self._measure.least)
+            change = (2.0 if done <= BLURS else OVER if done <= OVERS else 1.0) * change
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at = self._constraints.project(at + change.reshape(-1, 2))
             error, now = self._measure.error(at)

@@ -16,7 +16,7 @@ from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
-from warpsplat.fit.rounding import STAGED_COST, byte_worth
+from warpsplat.fit.rounding import byte_worth
 from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
@@ -38,8 +38,11 @@ that nobody would miss."""
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
-MEASURED_GRIDS = 2.0, DRAFT_GRID
+MEASURED_GRIDS = 3.0, 8.0, 20.0, 50.0
 """View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
+
+LASTING = 0.7
+"""Share of the error by rounding that is left once the handles have been refitted, measured."""
 
 WORTHWHILE = 0.004
 """Least share of the file's bytes that a round saves for another one to follow."""
@@ -178,14 +181,15 @@ def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    coarse, fine = (len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS)
-    worth = price * byte_worth(max(fit.error, LEAST_ERROR), fine)
+    sizes = [len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS]
+    digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
+    worth = price * byte_worth(max(fit.error, LEAST_ERROR), sizes[1])
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
         loss = float(model.errors(samples, low.cubics()).sum() - before)
-        doublings = elementary.log2(grid / MEASURED_GRIDS[0]) / elementary.log2(
-            MEASURED_GRIDS[1] / MEASURED_GRIDS[0]
-        )
-        costs[grid] = 2 * STAGED_COST * loss + worth * (fine - coarse) * doublings
+        k = min(sum(grid >= g for g in MEASURED_GRIDS[1:]), len(sizes) - 2)
+        slope = (sizes[k + 1] - sizes[k]) / (digits[k + 1] - digits[k])
+        size = sizes[k] + slope * (elementary.log2(grid) - digits[k])
+        costs[grid] = LASTING * loss + worth * size
     return min(costs, key=costs.__getitem__)
