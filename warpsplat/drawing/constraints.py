@@ -22,9 +22,8 @@ SAME_COORDINATE = 1e-3
 MAX_LEVERAGE = 8.0
 """Maximum length of a handle that a line directs, in lengths of the line: rounding rotates longer ones."""
 
-import os
-HELD_LEVERAGE = float(os.environ.get("LEV","1"))
-"""The same once points are held where rounding has left them: the image directs the others' handles."""
+HELD_LEVERAGE = 1.0
+"""The same where points are held after they were rounded."""
 
 MIN_LENGTH = 1e-6
 """[canvas units] shorter vectors have no direction."""

@@ -31,6 +31,9 @@ ROUNDS = 16
 FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
+FIRST_FAR, SECOND_FAR = 4, 3
+"""Steps at the beginning of the first two that look farther than to the next pixel's border."""
+
 LEAST_ERROR = 3e-5
 """Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
 that nobody would miss."""
@@ -89,10 +92,10 @@ def finish_drawing(
     if not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
-    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS)
+    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
-        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
     equal: list[Equal] = []
     if tidy:
         fitted = fit.drawing
