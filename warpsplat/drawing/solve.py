@@ -57,8 +57,8 @@ class Bending:
         """Return the errors of the samples, and the derivative of their sum by the coordinates."""
         s = self._samples
         corners = points.ravel()[self._rows].reshape(4, 2, -1)
-        away = (bernstein(s.t).T[:, None] * corners[..., s.cubic]).sum(axis=0) - s.place.T
-        across = (away * s.across.T).sum(axis=0)
+        corners = (corners[..., s.cubic] * s.across.T).sum(axis=1)
+        across = (bernstein(s.t).T * corners).sum(axis=0) - (s.place * s.across).T.sum(axis=0)
         count = self._rows.shape[1]
         gradient = np.stack([summed(s.cubic, own * across, count) for own in self._weighted])
         return s.weight * across**2, self._sums(gradient)
