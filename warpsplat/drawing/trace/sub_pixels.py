@@ -72,7 +72,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
 
 def _border(painted: Ints) -> int:
     """Return at how many places neighbours differ."""
-    return sum(np.count_nonzero(np.diff(painted, axis=axis)) for axis in (0, 1))
+    return sum(int(np.count_nonzero(np.diff(painted, axis=axis))) for axis in (0, 1))
 
 
 def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
