@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.scene.attributes import Joint
-from warpsplat.scene.scene import ranges
+from warpsplat.scene.scene import ranges, starts_of
 
 Ints = npt.NDArray[np.int32]
 Links = npt.NDArray[np.intp]
@@ -53,6 +53,24 @@ class Drawing:
         """Return the shapes ``index``, in that order."""
         points = ranges(self.scene.first[:-1][index], self.scene.point_counts()[index])
         return Drawing(self.scene.take(index), self.joints[points])
+
+    def contours(self, chosen: Flags) -> Drawing:
+        """Return the ``chosen`` contours, shape (contour,), as one shape."""
+        counts = np.diff(self.scene.starts)[chosen]
+        points = ranges(self.scene.starts[:-1][chosen], counts)
+        scene = replace(
+            self.scene.take(np.array([0])),
+            points=self.scene.points[points],
+            starts=starts_of(counts),
+            closed=self.scene.closed[chosen],
+            first=np.array([0, len(points)], self.scene.first.dtype),
+        )
+        return Drawing(scene, self.joints[points])
+
+    def contour(self) -> Links:
+        """Return the contour of each cubic, shape (cubic,)."""
+        counts = np.diff(self.scene.starts) // 3
+        return np.repeat(np.arange(len(counts)), counts)
 
     def following(self) -> Links:
         """Return the cubic after each one on its contour, shape (cubic,); cubic i begins at point 3 i."""

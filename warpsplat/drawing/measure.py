@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
-from warpsplat.drawing.constraints import Drawing, Floats, Links, summed, with_ends
+from warpsplat.drawing.constraints import Drawing, Flags, Floats, Links, summed, with_ends
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.outline import Outline, OutlineBuffers
@@ -52,7 +52,7 @@ class Samples:
     weight: Floats
     """By how much the mean squared error grows for each square of the distance across, shape (sample,)."""
 
-    def take(self, index: Links) -> Samples:
+    def take(self, index: Links | Flags) -> Samples:
         """Return the samples ``index``, in that order."""
         return Samples(**{name: values[index] for name, values in vars(self).items()})
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, summed, with_ends
-from warpsplat.drawing.measure import Samples, bernstein
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, summed, with_ends
+from warpsplat.drawing.measure import Samples
 from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits
 from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.scene.scene import ranges
@@ -19,18 +19,21 @@ DAMPING = 0.01
 """Added curvature, as a share."""
 
 
+def polynomials(cubics: Floats, chosen: Links) -> Floats:
+    """Return the coefficients of the ``chosen`` cubics, lowest first, shape (4, 2, chosen)."""
+    a, b, c, d = cubics.transpose(1, 2, 0)
+    return np.stack([a, 3 * (b - a), 3 * (c - 2 * b + a), d - 3 * c + 3 * b - a])[..., chosen]
+
+
 def placed(samples: Samples, cubics: Floats, rounds: int = PLACING_ROUNDS) -> Samples:
     """Return samples at the places of ``cubics``, shape (cubic, 4, 2), that are nearest to theirs."""
-    t, corners = samples.t, cubics[samples.cubic]
-    slopes = 3 * np.diff(corners, axis=1)
-    bends = 2 * np.diff(slopes, axis=1)
+    t, (a, b, c, d) = samples.t, polynomials(cubics, samples.cubic)
+    a = a - samples.place.T
     for _ in range(rounds):
-        s, u = (1 - t)[:, None], t[:, None]
-        away = (bernstein(t)[..., None] * corners).sum(axis=1) - samples.place
-        speed = s * s * slopes[:, 0] + 2 * s * u * slopes[:, 1] + u * u * slopes[:, 2]
-        bend = s * bends[:, 0] + u * bends[:, 1]
-        first = (away * speed).sum(axis=1)
-        second = (speed * speed).sum(axis=1) + np.maximum((away * bend).sum(axis=1), 0)
+        away = ((d * t + c) * t + b) * t + a
+        speed, bend = (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
+        first, curvature = away[0] * speed[0] + away[1] * speed[1], away[0] * bend[0] + away[1] * bend[1]
+        second = speed[0] * speed[0] + speed[1] * speed[1] + np.maximum(curvature, 0)
         t = np.clip(t - first / np.maximum(second, 1e-12), 0, 1)
     return replace(samples, t=t)
 
@@ -89,8 +92,9 @@ def chords(cubics: Floats) -> Floats:
 
 def errors(samples: Samples, cubics: Floats) -> Floats:
     """Return the errors of the samples on ``cubics``."""
-    at = (bernstein(samples.t)[..., None] * cubics[samples.cubic]).sum(axis=1)
-    return np.asarray(samples.weight * ((at - samples.place) * samples.across).sum(axis=1) ** 2)
+    t, (a, b, c, d) = samples.t, polynomials(cubics, samples.cubic)
+    x, y = (((d * t + c) * t + b) * t + a - samples.place.T) * samples.across.T
+    return np.asarray(samples.weight * (x + y) ** 2)
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
@@ -113,8 +117,23 @@ def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Sa
     return replace(samples, t=t, cubic=cubic).take(order)
 
 
-def fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Drawing, Samples, Floats]:
-    """Fit outlines to ``samples``; return them, the samples on them, and the errors by cubic."""
+def fitted(
+    samples: Samples, drawing: Drawing, least: float, chosen: Flags
+) -> tuple[Drawing, Samples, Floats]:
+    """Fit the ``chosen`` contours to ``samples``; return all, their samples, and the errors by cubic."""
+    inside = chosen[drawing.contour()]
+    own = inside[samples.cubic]
+    part = samples.take(own)
+    part = replace(part, cubic=(np.cumsum(inside) - 1)[part.cubic])
+    made, part = _fitted(part, drawing.contours(chosen), least)
+    points, t = drawing.scene.points.copy(), samples.t.copy()
+    points[np.repeat(inside, 3)], t[own] = made, part.t
+    samples, fit = replace(samples, t=t), replace(drawing, scene=replace(drawing.scene, points=points))
+    return fit, samples, summed(samples.cubic, errors(samples, fit.cubics()), len(inside))
+
+
+def _fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Floats, Samples]:
+    """Return the points of outlines fitted to ``samples``, and the samples on them."""
     constraints, following = Constraints(drawing), drawing.following()
     points = constraints.project(drawing.scene.points.astype(np.float64))
     samples = placed(samples, with_ends(points, following))
@@ -125,5 +144,15 @@ def fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Drawing, S
         change = np.clip(newton_step(bending, freedom, gradient, damping, least), -1, 1)
         points = constraints.project(points + freedom.times(change).reshape(-1, 2))
         samples = placed(samples, with_ends(points, following))
-    found = summed(samples.cubic, errors(samples, with_ends(points, following)), len(following))
-    return replace(drawing, scene=replace(drawing.scene, points=points.astype(np.float32))), samples, found
+    return points, samples
+
+
+def known(
+    samples: Samples, drawing: Drawing, fit: tuple[Samples, Drawing], chosen: Flags
+) -> tuple[Samples, Drawing]:
+    """Return samples and outlines with the ``chosen`` contours as they were fitted before."""
+    now, before = (chosen[made.contour()] for made in (drawing, fit[1]))
+    points, t = drawing.scene.points.copy(), samples.t.copy()
+    points[np.repeat(now, 3)] = fit[1].scene.points[np.repeat(before, 3)]
+    t[now[samples.cubic]] = fit[0].t[before[fit[0].cubic]]
+    return replace(samples, t=t), replace(drawing, scene=replace(drawing.scene, points=points))

@@ -63,7 +63,7 @@ class Outlines:
 
     def edits(self, refused: Flags) -> Edits:
         """Return all candidates but the ``refused`` ones, by cubic and kind, shape (cubic, 4)."""
-        found = [self._merged(), self._straight(), self._level(), self._leaning()]
+        found = [self._merged(~refused[:, WITHOUT]), self._straight(), self._level(), self._leaning()]
         names = vars(found[0])
         edits = Edits(**{name: np.concatenate([vars(part)[name] for part in found]) for name in names})
         return edits.take(~refused[edits.at, edits.kind])
@@ -81,9 +81,9 @@ class Outlines:
         saved = np.broadcast_to(np.asarray(saved, np.intp), at.shape)
         return Edits(np.full(len(at), kind), at, saved=saved, around=around, **values)
 
-    def _merged(self) -> Edits:
-        """Return the points that can go: those of outlines with three pieces or more."""
-        at = np.flatnonzero(self._next[self._next] != self._previous)
+    def _merged(self, wanted: Flags) -> Edits:
+        """Return the ``wanted`` points that can go: those of outlines with three pieces or more."""
+        at = np.flatnonzero(wanted & (self._next[self._next] != self._previous))
         at = at[self._next[self._next[at]] != at]
         before = self._previous[at]
         cubics = with_ends(self._points, self._next)

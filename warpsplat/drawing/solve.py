@@ -18,49 +18,50 @@ class Bending:
         """``following``: as ``Drawing.following``."""
         count = len(following)
         own = np.arange(6 * count).reshape(count, 6)
-        self._rows = np.concatenate([own, own[following, :2]], axis=1)
+        self._rows = np.concatenate([own, own[following, :2]], axis=1).T
         self._size = 6 * count
-        self.slopes = (bernstein(samples.t)[..., None] * samples.across[:, None]).reshape(-1, 8)
-        bounds = np.searchsorted(samples.cubic, np.arange(count))
-        filled = np.bincount(samples.cubic, minlength=count) > 0
-        weighted = 2 * samples.weight[:, None] * self.slopes
-        self._blocks = np.zeros((count, 8, 8))
-        if len(samples.t):
-            for k in range(8):
-                sums = np.add.reduceat(weighted * self.slopes[:, k : k + 1], bounds[filled], axis=0)
-                self._blocks[filled, k] = sums
+        weights = bernstein(samples.t).T
+        slopes = np.stack([weight * across for weight in weights for across in samples.across.T])
+        self.slopes = slopes.T
+        # Arrays have the cubics last: sums along short last axes take ten times as long.
+        self._weighted = 2 * samples.weight * slopes
+        self._blocks = np.zeros((8, 8, count))
+        for i in range(8):
+            for j in range(i + 1):
+                sums = summed(samples.cubic, self._weighted[i] * slopes[j], count)
+                self._blocks[i, j] = self._blocks[j, i] = sums
         self._samples = samples
-        self._weighted = weighted
 
     def times(self, change: Floats) -> Floats:
         """Return the change of the gradient by a change of the coordinates."""
-        moved = change[self._rows]
-        return summed(self._rows.ravel(), (self._blocks * moved[:, None]).sum(axis=2).ravel(), self._size)
+        moved = (self._blocks * change[self._rows]).sum(axis=1)
+        return summed(self._rows.ravel(), moved.ravel(), self._size)
 
     def diagonal(self) -> Floats:
         """Return the diagonal."""
-        return self._sums(self._blocks[:, range(8), range(8)])
+        return self._sums(self._blocks[range(8), range(8)])
 
     def stiffness(self, factors: Floats) -> Floats:
         """Return ``factors``, by cubic, times the curvature of each point, the same in all directions.
 
         An outline that slides along itself costs nothing, but leads away.
         """
-        own = self._blocks[:, range(8), range(8)].reshape(-1, 4, 2).sum(axis=2) * factors[:, None]
-        return self._sums(np.repeat(own, 2, axis=1))
+        own = self._blocks[range(8), range(8)].reshape(4, 2, -1).sum(axis=1) * factors
+        return self._sums(np.repeat(own, 2, axis=0))
 
     def _sums(self, corners: Floats) -> Floats:
-        """Return sums of numbers at the coordinates of the cubics' control points, shape (cubic, 8)."""
+        """Return sums of numbers at the coordinates of the cubics' control points, shape (8, cubic)."""
         return summed(self._rows.ravel(), corners.ravel(), self._size)
 
     def error_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the errors of the samples, and the derivative of their sum by the coordinates."""
         s = self._samples
-        corners = points.ravel()[self._rows].reshape(-1, 4, 2)
-        away = (bernstein(s.t)[..., None] * corners[s.cubic]).sum(axis=1) - s.place
-        across = (away * s.across).sum(axis=1)
-        gradient = self._weighted * across[:, None]
-        return s.weight * across**2, summed(self._rows[s.cubic].ravel(), gradient.ravel(), self._size)
+        corners = points.ravel()[self._rows].reshape(4, 2, -1)
+        corners = (corners[..., s.cubic] * s.across.T).sum(axis=1)
+        across = (bernstein(s.t).T * corners).sum(axis=0) - (s.place * s.across).T.sum(axis=0)
+        count = self._rows.shape[1]
+        gradient = np.stack([summed(s.cubic, own * across, count) for own in self._weighted])
+        return s.weight * across**2, self._sums(gradient)
 
 
 def newton_step(

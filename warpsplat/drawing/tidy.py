@@ -10,7 +10,7 @@ import numpy as np
 from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
-from warpsplat.drawing.constraints import Constraints, Drawing, Floats, summed
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, summed
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
@@ -159,10 +159,16 @@ def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
         cheap = growth <= RECOVERED * edits.saved * worth
         edits, growth = edits.take(cheap), growth[cheap]
         left = edits.take(apart(edits, growth / edits.saved))
+        contour, count = drawing.contour(), len(drawing.scene.starts) - 1
+        stale, fit_before = touched(contour[left.at], count), None
+        # Outlines without candidates, or whose candidates are all refused, stay as they are.
+        refused[~stale[contour]] = True
         while len(left.at):
             edited, keep = applied(drawing, left)
             moved = model.carried(samples, drawing, left, keep)
-            edited, moved, after = model.fitted(moved, edited, least)
+            if fit_before:
+                moved, edited = model.known(moved, edited, fit_before, ~stale)
+            edited, moved, after = model.fitted(moved, edited, least, stale)
             every = np.zeros(len(keep))
             every[keep] = after
             change = every - errors
@@ -173,11 +179,17 @@ def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
             if taken.all():
                 drawing, samples, errors, refused = edited, moved, after, refused[keep]
                 break
+            stale, fit_before = touched(contour[left.at[~taken]], count), (moved, edited)
             left = left.take(taken)
         size -= int(left.saved.sum())
         if left.saved.sum() < WORTHWHILE * first:
             break
     return drawing
+
+
+def touched(contours: Links, count: int) -> Flags:
+    """Return which of ``count`` contours are among ``contours``."""
+    return np.bincount(contours, minlength=count) > 0
 
 
 def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:

@@ -109,3 +109,12 @@ def test_other_images_have_no_cells() -> None:
     small = cv2.resize(photo, (24, 24), interpolation=cv2.INTER_AREA)
     images = (disc, dots, photo, jpeg(photo, 75), scaled(small, 4, Image.Resampling.BILINEAR))
     assert [find_lattice(image) for image in images] == [None] * len(images)
+
+
+def test_blurred_cells_of_two_tones_are_found() -> None:
+    code = cv2.QRCodeEncoder.create().encode("warpsplat")
+    blurred = np.asarray(Image.fromarray(code).resize((4 * len(code) + 11,) * 2, Image.Resampling.LANCZOS))
+    found = find_lattice(np.repeat(blurred[..., None], 3, axis=2))
+    assert found is not None
+    dark = found.palette[found.colors].mean(axis=2) < 128
+    assert np.array_equal(dark, code < 128)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.drawing.trace.drawings import draw_exactly, ground, levels
 from warpsplat.drawing.trace.regions import Regions, find_regions
@@ -56,3 +58,10 @@ def test_broad_shapes_keep_their_pixels() -> None:
         ground("#ffffff", 40, 40) + '<circle cx="20" cy="20" r="12.3" fill="#a02030"/>', 40, 40
     )
     assert with_sub_pixels(find_regions(levels(image))).scale == 1
+
+
+def test_a_blurred_image_keeps_whole_pixels() -> None:
+    code = cv2.QRCodeEncoder.create().encode("warpsplat")
+    soft = np.asarray(Image.fromarray(code).resize((round(3.3 * len(code)),) * 2, Image.Resampling.BICUBIC))
+    regions = find_regions(np.stack([soft, soft, soft, np.full_like(soft, 255)], axis=2))
+    assert with_sub_pixels(regions) is regions

@@ -32,8 +32,12 @@ NEARLY = 0.9
 FEWEST_EDGES = 8.0
 """Fewest lines with edges, counted by their weights, for a lattice: few are in step by chance."""
 
-EXPLAINED, EXPLAINED_SOFT = 0.93, 0.98
-"""Least share of an image's variance that its cells must explain; of a smooth one any would explain much."""
+EXPLAINED, EXPLAINED_SOFT, EXPLAINED_TONES = 0.93, 0.98, 0.8
+"""Least share of an image's variance that its cells must explain; of a smooth one any would explain much.
+Blur takes the corners off cells of two tones."""
+
+LEAST_EDGES = 0.02
+"""Least share of the pixels at which dark and light ones meet, along each axis, for cells of two tones."""
 
 SHARPENINGS = 4
 """Times that interpolated colours are compared with the image, and corrected."""
@@ -98,13 +102,40 @@ def find_lattice(levels: Ints) -> Lattice | None:
     ``levels``: 0..255, shape (height, width, channel).
     """
     for soft in (False, True):
-        columns = find_axis(levels, 1, soft=soft)
-        rows = find_axis(levels, 0, soft=soft) if columns else None
-        if columns and rows and ALIKE * columns.period < rows.period < columns.period / ALIKE:
-            found = _with_colors(levels, columns, rows, soft=soft)
-            if found:
-                return found
-    return None
+        axes = _find_axes(levels, soft=soft)
+        found = _with_colors(levels, axes, soft, EXPLAINED_SOFT if soft else EXPLAINED) if axes else None
+        if found:
+            return found
+    return _two_tones(levels)
+
+
+def _find_axes(levels: Ints, *, soft: bool) -> tuple[Axis, Axis] | None:
+    """Return the lines between columns and between rows of cells that are nearly square."""
+    columns = find_axis(levels, 1, soft=soft)
+    rows = find_axis(levels, 0, soft=soft) if columns else None
+    is_square = columns and rows and ALIKE * columns.period < rows.period < columns.period / ALIKE
+    return (columns, rows) if columns and rows and is_square else None
+
+
+def _two_tones(levels: Ints) -> Lattice | None:
+    """Return the dark and light cells of an image; None if it is not made of such. They may be blurred."""
+    tone = levels[..., :3].astype(np.int32).sum(axis=2)
+    dark = (2 * tone < tone.min() + tone.max()).astype(np.uint8)
+    if min(np.count_nonzero(np.diff(dark, axis=axis)) for axis in (0, 1)) < LEAST_EDGES * dark.size:
+        return None
+    two = 255 * dark[..., None].astype(np.int64)
+    axes = _find_axes(two, soft=False)
+    found = _with_colors(two, axes, False, EXPLAINED_TONES) if axes else None
+    if found is None or len(found.palette) != 2:
+        return None
+    inside = np.ix_(_middles(found.rows.borders(len(dark))), _middles(found.columns.borders(dark.shape[1])))
+    colors = [np.median(levels[inside][found.colors == number], axis=0) for number in (0, 1)]
+    return found._replace(palette=np.round(colors).astype(np.int64))
+
+
+def _middles(borders: Floats) -> Ints:
+    """Return the pixel in the middle of each cell, shape (cell,)."""
+    return np.minimum((borders[:-1] + borders[1:]) / 2, borders[-1] - 1).astype(np.intp)
 
 
 def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
@@ -184,8 +215,12 @@ def _steps(lines: Ints, *, soft: bool) -> Ints:
     return np.abs(np.diff(lines.astype(np.int16), n=1 + soft, axis=0)).sum(axis=(1, 2), dtype=np.int64)
 
 
-def _with_colors(levels: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Lattice | None:
-    """Return the cells with their colours; None if there are too few or too many, or they are not even."""
+def _with_colors(levels: Ints, axes: tuple[Axis, Axis], soft: bool, least: float) -> Lattice | None:
+    """Return the cells with their colours; None if there are too few or too many, or they are not even.
+
+    ``least``: share of the variance that they must explain.
+    """
+    columns, rows = axes
     height, width = levels.shape[:2]
     down, across = rows.borders(height), columns.borders(width)
     if not all(CELLS[0] <= len(borders) - 1 <= CELLS[1] for borders in (down, across)):
@@ -206,7 +241,7 @@ def _with_colors(levels: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Latt
     if not soft:
         mixed = _averaged(_averaged(colors, down, height, 0), across, width, 1)
         error = min(error, np.square(levels - mixed), key=np.sum)
-    if error.sum() > (1 - (EXPLAINED_SOFT if soft else EXPLAINED)) * variance.sum():
+    if error.sum() > (1 - least) * variance.sum():
         return None
     found = _numbered(colors, NOISES * float(np.sqrt(np.median(error))))
     return Lattice(columns, rows, *found) if found else None

@@ -28,6 +28,9 @@ PURE = 0.04  # share up to which a colour is no part of a pixel
 SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
 WEIGHT = 256  # that stands for 1 where weights are whole numbers
 SWEEPS = 4  # in which sub-pixels change places
+MOST_FRAYED = 1.25
+"""Most length of the borders of sub-pixels, over that of the borders of pixels. Where an image is blurred,
+shares are no areas of its pixels, and borders fray."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +60,19 @@ def with_sub_pixels(regions: Regions) -> Regions:
     if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
         return regions
     small = _mapped(painted, mixed, scale)
+    if _border(small) > MOST_FRAYED * scale * _border(painted):
+        return regions
     fills = colors[small]
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = small
     return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
+
+
+def _border(painted: Ints) -> int:
+    """Return at how many places neighbours differ."""
+    return sum(int(np.count_nonzero(np.diff(painted, axis=axis))) for axis in (0, 1))
 
 
 def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
