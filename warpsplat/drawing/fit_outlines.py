@@ -25,7 +25,7 @@ LEAST_GAIN, MOST_IDLE = 0.005, 4
 DAMPING, RAISED = 0.03, 0.3
 """Added curvature, as a share, at first, and where a step did not lower the error: more of it gets stuck."""
 
-LEAST_DAMPING, CALMER = 0.01, 0.1
+LEAST_DAMPING, CALMER = 0.002, 0.1
 """The least of it, and its factor where a step lowered the error."""
 
 MOST_STEP = 0.7
