@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -82,22 +83,22 @@ def finish_drawing(
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
             width, 4).
         drawing: as traced; or as it was finished at a lower price.
-        run: how the work is carried out; when it is over, the drawing is rounded as it is.
+        run: how the work is carried out; when it is over, the drawing stays as it is by then.
         finest: most view box units per pixel.
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
         symbols: whether nearly equal outlines become equal.
     """
     target = matching(target, drawing.scene.canvas)
-    if not len(drawing.scene):
+    if run.over() or not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
     fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
+        fit = OutlineFit(target, tidied(fit, price, run.over), run, fit.capacity)
         fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
     equal: list[Equal] = []
-    if tidy:
+    if tidy and not run.over():
         fitted = fit.drawing
         exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
         if exact is not fitted:
@@ -139,7 +140,7 @@ def with_exact_shapes(
     return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
 
 
-def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
+def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool) -> Drawing:
     """Return a drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round edits that do not overlap are made together and the outlines fitted to where the image says
@@ -182,7 +183,7 @@ def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
             stale, fit_before = touched(contour[left.at[~taken]], count), (moved, edited)
             left = left.take(taken)
         size -= int(left.saved.sum())
-        if left.saved.sum() < WORTHWHILE * first:
+        if left.saved.sum() < WORTHWHILE * first or over():
             break
     return drawing
 
