@@ -13,6 +13,7 @@ from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
+from warpsplat.portable import elementary
 from warpsplat.rendering.renderer import Capacity, render
 from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 
@@ -36,6 +37,13 @@ FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
 
 BLURRED_STEP = 2.0
 """By how much blurred gradients are too small."""
+
+ROAM_RATE, LAST_RATE, LEAST_SIZE = 0.15, 0.012, 1e-12
+"""Learning rates of free numbers at the beginning and at the end of ``roam`` [px], and the least size of a
+gradient."""
+
+ROAM_GAIN = 0.02
+"""Least share of the error that half of the steps of ``roam`` take away for the others to follow."""
 
 LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
@@ -171,6 +179,31 @@ class OutlineFit:
                 break
         if self._paints:
             self._measure.paint(self._paints.best)
+
+    def roam(self, run: Run, steps: int) -> None:
+        """Make so many steps of Adam (Kingma and Ba 2015), half of them where these gain nothing.
+
+        Where edges are less than a pixel apart, the model of single edges leads to poor minima; steps of one
+        length for all, whatever their gradients, lead out of them.
+        """
+        start, at, mean, square = (1 - ROAM_GAIN) * self.error, self.points, np.zeros(1), np.zeros(1)
+        rate, first, second = ROAM_RATE, 1.0, 1.0
+        slower = float(elementary.power(LAST_RATE / ROAM_RATE, 1 / max(steps, 1)))
+        for done in range(1, steps + 1):
+            rate, first, second = rate * slower, 0.9 * first, 0.999 * second
+            freedom = self._constraints.freedom(at)
+            gradient = freedom.adjoint(self._measure.gradient())
+            mean, square = 0.9 * mean + 0.1 * gradient, 0.999 * square + 0.001 * gradient * gradient
+            size = np.sqrt(square / (1 - second)) + LEAST_SIZE
+            change = -rate * mean / (1 - first) / size
+            at = self._constraints.project(at + freedom.times(change).reshape(-1, 2))
+            error, around = self._measure.error(at)
+            if error < self.error:
+                self.points, self.error, self._around = at, error, around
+            if run.over() or (done == steps // 2 and self.error > start):
+                break
+        self._measure.error(self.points)
+        self._measure.look()
 
     def _progress(self, done: int, steps: int, seconds: float) -> Progress:
         scene = self._scene()

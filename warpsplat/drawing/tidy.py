@@ -32,6 +32,9 @@ ROUNDS = 16
 FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
+FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
+"""Steps of Adam after the first two fits, where they are needed, and pixels that all of these may render."""
+
 FIRST_FAR, SECOND_FAR = 4, 3
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
 
@@ -94,9 +97,11 @@ def finish_drawing(
         return Finished(drawing, min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
     fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
+    _roam(fit, target, run, FIRST_ROAM)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, price, run.over), run, fit.capacity)
         fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
+        _roam(fit, target, run, SECOND_ROAM)
     equal: list[Equal] = []
     if tidy and not run.over():
         fitted = fit.drawing
@@ -112,6 +117,14 @@ def finish_drawing(
     drawing = fit.drawing
     low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
     return Finished(replace(drawing, scene=low), grid)
+
+
+def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int) -> None:
+    """Let outlines leave poor minima if the drawing is not yet near the image."""
+    if fit.error > LEAST_ERROR and not run.over():
+        quiet = replace(run, on_progress=None)
+        fit.roam(quiet, min(steps, ROAM_PIXELS // target[..., 0].size))
+        fit.advance(quiet, THIRD_STEPS)
 
 
 def with_exact_shapes(
