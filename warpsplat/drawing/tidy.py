@@ -17,7 +17,7 @@ from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
-from warpsplat.fit.rounding import STAGED_COST, byte_worth
+from warpsplat.fit.rounding import byte_worth
 from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
@@ -32,6 +32,9 @@ ROUNDS = 16
 FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
+FIRST_FAR, SECOND_FAR = 4, 3
+"""Steps at the beginning of the first two that look farther than to the next pixel's border."""
+
 LEAST_ERROR = 3e-5
 """Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
 that nobody would miss."""
@@ -39,8 +42,11 @@ that nobody would miss."""
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
-MEASURED_GRIDS = 2.0, DRAFT_GRID
+MEASURED_GRIDS = 3.0, 8.0, 20.0, 50.0
 """View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
+
+LASTING = 0.7
+"""Share of the error by rounding that is left once the handles have been refitted, measured."""
 
 WORTHWHILE = 0.004
 """Least share of the file's bytes that a round saves for another one to follow."""
@@ -87,16 +93,18 @@ def finish_drawing(
     if run.over() or not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
-    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS)
+    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, price, run.over), run, fit.capacity)
-        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
     equal: list[Equal] = []
     if tidy and not run.over():
         fitted = fit.drawing
         exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
         if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
+    if run.over():
+        return Finished(fit.drawing, min(DRAFT_GRID, finest))
     grid = drawing_grid(fit, finest, price)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
@@ -191,14 +199,15 @@ def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    coarse, fine = (len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS)
-    worth = price * byte_worth(max(fit.error, LEAST_ERROR), fine)
+    sizes = [len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS]
+    digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
+    worth = price * byte_worth(max(fit.error, LEAST_ERROR), sizes[1])
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
         loss = float(model.errors(samples, low.cubics()).sum() - before)
-        doublings = elementary.log2(grid / MEASURED_GRIDS[0]) / elementary.log2(
-            MEASURED_GRIDS[1] / MEASURED_GRIDS[0]
-        )
-        costs[grid] = 2 * STAGED_COST * loss + worth * (fine - coarse) * doublings
+        k = min(sum(grid >= g for g in MEASURED_GRIDS[1:]), len(sizes) - 2)
+        slope = (sizes[k + 1] - sizes[k]) / (digits[k + 1] - digits[k])
+        size = sizes[k] + slope * (elementary.log2(grid) - digits[k])
+        costs[grid] = LASTING * loss + worth * size
     return min(costs, key=costs.__getitem__)
