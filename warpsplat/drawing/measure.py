@@ -129,7 +129,7 @@ class Measure:
         self._parameters = Parameters(drawing.scene, backend)
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
-        self._viewport = viewport
+        self._tiles_x = viewport.tiles_x
         self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
         self._scale = 1 / (3 * viewport.pixel_count)
         self.least = LEAST_CONTRAST * self._scale
@@ -280,17 +280,27 @@ class Measure:
         return np.concatenate([2 * color - opacity, back], axis=1) * np.float32(self._scale)
 
     def _blurred(self, residual: FloatArray) -> FloatArray:
-        """Return ``residual`` blurred by 1/4, 1/2, 1/4 along both axes."""
-        across, down = self._viewport.tiles_x, self._viewport.tiles_y
-        every = np.zeros_like(self._grad[:, : residual.shape[1]])
-        every[self._tiles] = residual
-        image = every.reshape(down, across, -1, TILE, TILE).transpose(2, 0, 4, 1, 3)
-        image = image.reshape(-1, down * TILE, across * TILE)
-        image = np.pad(image, ((0, 0), (1, 1), (1, 1)), mode="edge")
-        image = image[:, 1:-1] * 0.5 + (image[:, :-2] + image[:, 2:]) * 0.25
-        image = image[:, :, 1:-1] * 0.5 + (image[:, :, :-2] + image[:, :, 2:]) * 0.25
-        blocks = image.reshape(-1, down, TILE, across, TILE).transpose(1, 3, 0, 4, 2)
-        return np.ascontiguousarray(blocks.reshape(every.shape)[self._tiles], np.float32)
+        """Return ``residual`` blurred by 1/4, 1/2, 1/4 along both axes; beyond its tiles there is none."""
+        quarter = np.float32(0.25)
+        for axis in (2, 3):
+            values = np.swapaxes(residual, 0, axis)
+            blurred = 2 * quarter * values
+            blurred[1:] += quarter * values[:-1]
+            blurred[:-1] += quarter * values[1:]
+            for sign, edge, other in ((-1, 0, -1), (1, -1, 0)):
+                here, there = self._beside(axis, sign)
+                lines = np.swapaxes(blurred[edge], 0, axis - 1)
+                lines[here] += quarter * np.swapaxes(values[other], 0, axis - 1)[there]
+            residual = np.swapaxes(blurred, 0, axis)
+        return residual
+
+    def _beside(self, axis: int, sign: int) -> tuple[Links, Links]:
+        """Return which of the tiles have one beside them along an axis of tiles, and that one."""
+        wanted = self._tiles + sign * (1 if axis == 2 else self._tiles_x)
+        there = np.minimum(np.searchsorted(self._tiles, wanted), len(wanted) - 1)
+        in_row = wanted // self._tiles_x == self._tiles // self._tiles_x
+        here = np.flatnonzero((self._tiles[there] == wanted) & (in_row | (axis == 3)))
+        return here, there[here]
 
     def _channels(self) -> Iterator[FloatArray]:
         """Yield gradients of the image whose squares add up to the squared error's.

@@ -22,6 +22,7 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.primitives import Primitive
+from warpsplat.svg.primitives import cubics_of as primitive_cubics
 
 Floats = npt.NDArray[np.float64]
 
@@ -119,16 +120,25 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
     if not len(contours):
         return []
     areas, sizes = _areas(samples.points), _sizes(drawing)[contours]
-    made = [nearest(family, samples) for family in FAMILIES]
-    costs = np.stack([_costs(f, fits, samples, areas, worth) for f, fits in zip(FAMILIES, made, strict=True)])
-    best = costs.argmin(axis=0)
-    found = []
-    for i in np.flatnonzero(np.isfinite(costs.min(axis=0))).tolist():
-        contour, family, fits = int(contours[i]), FAMILIES[best[i]], made[best[i]]
-        values, saved = (fits.values[i], fits.stiffness[i]), float(sizes[i]) - family.size
-        cubics = cubics_of(scene, contour)
-        found.append(Candidate(contour, cubics, family, *values, bool(areas[i] > 0), saved))
-    return found
+    found: dict[int, Candidate] = {}
+    least = np.full(len(contours), np.inf)
+    for family in FAMILIES:
+        # Families come by size: a shape that costs less than the size of the next one alone is the best.
+        rows = np.flatnonzero(least >= worth * family.size)
+        if not len(rows):
+            break
+        own = Samples(samples.points[rows], samples.weights[rows])
+        fits = nearest(family, own)
+        costs = _costs(family, fits, own, areas[rows], worth)
+        for k in np.flatnonzero(costs < least[rows]).tolist():
+            i = int(rows[k])
+            contour, saved = int(contours[i]), float(sizes[i]) - family.size
+            values = fits.values[k], fits.stiffness[k]
+            found[i] = Candidate(
+                contour, cubics_of(scene, contour), family, *values, bool(areas[i] > 0), saved
+            )
+        least[rows] = np.minimum(least[rows], costs)
+    return [found[i] for i in sorted(found)]
 
 
 def cubics_of(scene: Scene, contour: int) -> Floats:
@@ -248,11 +258,13 @@ def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: f
 
 def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
     """Return a drawing with basic shapes in place of contours."""
-    contours = {}
-    for one in chosen:
-        cubics = one.made.cubics()
-        joints = joints_of([Pieces(cubics, _is_line(cubics))])
-        contours[one.contour] = cubics[:, :3].reshape(-1, 2), joints
+    cubics = primitive_cubics([one.made for one in chosen])
+    joints = joints_of([Pieces(own, _is_line(own)) for own in cubics])
+    ends = np.cumsum([3 * len(own) for own in cubics])
+    contours = {
+        one.contour: (own[:, :3].reshape(-1, 2), turns)
+        for one, own, turns in zip(chosen, cubics, np.split(joints, ends[:-1]), strict=True)
+    }
     return with_contours(drawing, contours)
 
 

@@ -5,13 +5,13 @@ All of them are boxes with corners of some radii: 0 for sharp ones, half the sid
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.scene import Basis, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
@@ -58,20 +58,7 @@ class Primitive:
 
     def cubics(self) -> Floats:
         """Return its arcs and sides, the first one an arc at the upper left, shape (piece, 4, 2)."""
-        (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
-        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-        nodes = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
-        nodes += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
-        places = np.array([*nodes, nodes[0]])
-        found = []
-        for i, corner in enumerate(corners):
-            a, b, c = places[2 * i : 2 * i + 3]
-            if rx > 0:
-                found.append([a, a + ARC_HANDLE * (corner - a), b + ARC_HANDLE * (corner - b), b])
-            if not self.is_round[i % 2]:
-                found.append([b, (2 * b + c) / 3, (b + 2 * c) / 3, c])
-        cubics = np.array(found)
-        return cubics if self.is_clockwise else cubics[::-1, ::-1]
+        return cubics_of([self])[0]
 
     def element(self) -> str:
         """Return the element without brackets and style, such as ``circle cx="9" cy="9" r="5"``."""
@@ -110,10 +97,45 @@ class Primitive:
         return text, start
 
 
+def cubics_of(made: Sequence[Primitive]) -> list[Floats]:
+    """Return the arcs and sides of each of some shapes, as ``Primitive.cubics``."""
+    found: list[Floats] = [np.zeros((0, 4, 2))] * len(made)
+    alike: dict[tuple[bool, bool, bool, bool], list[int]] = {}
+    for i, one in enumerate(made):
+        alike.setdefault((*one.is_round, one.radii[0] > 0, one.is_clockwise), []).append(i)
+    for (*is_round, has_arcs, is_clockwise), chosen in alike.items():
+        values = np.array([(*made[i].low, *made[i].high, *made[i].radii) for i in chosen], np.float64)
+        x0, y0, x1, y1, rx, ry = values.T
+        corners = [np.stack(own, axis=1) for own in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+        nodes = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
+        nodes += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
+        places = [np.stack(own, axis=1) for own in (*nodes, nodes[0])]
+        pieces: list[Floats] = []
+        for i, corner in enumerate(corners):
+            a, b, c = places[2 * i : 2 * i + 3]
+            if has_arcs:
+                pieces += [a, a + ARC_HANDLE * (corner - a), b + ARC_HANDLE * (corner - b), b]
+            if not is_round[i % 2]:
+                pieces += [b, (2 * b + c) / 3, (b + 2 * c) / 3, c]
+        cubics = np.stack(pieces, axis=1).reshape(len(chosen), -1, 4, 2)
+        for i, own in zip(chosen, cubics if is_clockwise else cubics[:, ::-1, ::-1], strict=True):
+            found[i] = own
+    return found
+
+
 def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
     """Yield the contours of fills that are ellipses or rectangles.
 
     ``exact``: the scene's points in units of the view box, shape (point, 2).
+    """
+    for contours, made, _ in _alike(scene, exact):
+        yield from zip(contours.tolist(), made, strict=True)
+
+
+def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, list[Primitive], IndexArray]]:
+    """Yield contours of equally many points that are ellipses or rectangles, these, and how they are turned.
+
+    That is by how many points a contour's start is behind that of the shape's cubics.
     """
     for group in scene.alike():
         count = group.points.shape[1]
@@ -130,20 +152,25 @@ def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
         likely &= (high - low > NEAR).all(axis=1) & (2 * radii <= high - low + NEAR).all(axis=1)
         x, y = points[..., 0], points[..., 1]
         turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
-        for i in np.flatnonzero(likely).tolist():
-            (x0, y0), (x1, y1), (rx, ry) = (values[i].tolist() for values in (low, high, radii))
-            made = Primitive((x0, y0), (x1, y1), (rx, ry), bool(turning[i]))
-            if _turned(made, points[i]) is not None:
-                yield int(group.contours[i]), made
+        chosen = np.flatnonzero(likely)
+        boxes = (own[chosen].tolist() for own in (low, high, radii, turning))
+        made = [Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in zip(*boxes)]
+        near, turned = _turned(made, points[chosen])
+        yield group.contours[chosen[near]], [made[i] for i in near.tolist()], turned
 
 
-def _turned(made: Primitive, points: Floats) -> int | None:
-    """Return by how many points an outline's start is behind that of ``made``; None: they differ."""
-    ring = made.cubics()[:, :3].reshape(-1, 2)
-    if ring.shape != points.shape:
-        return None
-    start = int(np.abs(ring - points[0]).sum(axis=1).argmin())
-    return start if np.abs(np.roll(ring, -start, axis=0) - points).max() <= NEAR else None
+def _turned(made: Sequence[Primitive], points: Floats) -> tuple[IndexArray, IndexArray]:
+    """Return which shapes outlines (outline, point, 2) are, and by how many points those start later."""
+    count = points.shape[1]
+    rings = [cubics[:, :3].reshape(-1, 2) for cubics in cubics_of(made)]
+    same = np.array([i for i, ring in enumerate(rings) if len(ring) == count], np.intp)
+    if not len(same):
+        return same, same
+    ring, points = np.stack([rings[i] for i in same.tolist()]), points[same]
+    turned = np.abs(ring - points[:, :1]).sum(axis=2).argmin(axis=1)
+    rows = (turned[:, None] + np.arange(count)) % count
+    near = np.abs(np.take_along_axis(ring, rows[..., None], axis=1) - points).max(axis=(1, 2)) <= NEAR
+    return same[near], turned[near]
 
 
 def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[slice, Floats]]:
@@ -151,15 +178,15 @@ def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[slice, Floats
 
     Arguments are those of ``primitives``.
     """
-    for contour, made in primitives(scene, exact):
-        held = made.rounded() if made.radii[0] > 0 else None
-        if held is None:
-            continue
-        rows = slice(*scene.starts[contour : contour + 2].tolist())
-        start = _turned(made, exact[rows])
-        ring = held.cubics()[:, :3].reshape(-1, 2)
-        if start is not None and ring.shape == exact[rows].shape:
-            yield rows, np.roll(ring, -start, axis=0)
+    for contours, made, turned in _alike(scene, exact):
+        held = [one.rounded() if one.radii[0] > 0 else None for one in made]
+        rings = iter(cubics_of([one for one in held if one]))
+        for contour, one, start in zip(contours.tolist(), held, turned.tolist(), strict=True):
+            if one is None:
+                continue
+            rows, ring = slice(*scene.starts[contour : contour + 2].tolist()), next(rings)[:, :3].reshape(-1, 2)
+            if len(ring) == rows.stop - rows.start:
+                yield rows, np.roll(ring, -start, axis=0)
 
 
 def held_rounds(scene: Scene, per_pixel: float) -> npt.NDArray[np.bool_]:
