@@ -154,9 +154,7 @@ def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, list[Primi
         turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
         chosen = np.flatnonzero(likely)
         boxes = (own[chosen].tolist() for own in (low, high, radii, turning))
-        made = [
-            Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in zip(*boxes)
-        ]
+        made = [Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in zip(*boxes)]
         near, turned = _turned(made, points[chosen])
         yield group.contours[chosen[near]], [made[i] for i in near.tolist()], turned
 
@@ -186,10 +184,7 @@ def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[slice, Floats
         for contour, one, start in zip(contours.tolist(), held, turned.tolist(), strict=True):
             if one is None:
                 continue
-            rows, ring = (
-                slice(*scene.starts[contour : contour + 2].tolist()),
-                next(rings)[:, :3].reshape(-1, 2),
-            )
+            rows, ring = slice(*scene.starts[contour : contour + 2].tolist()), next(rings)[:, :3].reshape(-1, 2)
             if len(ring) == rows.stop - rows.start:
                 yield rows, np.roll(ring, -start, axis=0)
 

@@ -15,7 +15,7 @@ LEAST_ERROR = 3e-5
 """Mean squared error of a drawing without noise, sRGB in [0, 1]: 45 dB."""
 
 WORTH = 0.6
-"""Share by which the error may grow for the bytes of all regions at the usual price: 1.8 dB for half of them."""
+"""Share by which the error may grow for the bytes of all regions at the usual price: 1.8 dB for half."""
 
 
 def fewer_regions(regions: Regions, most: int) -> Regions:
