@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from functools import partial
 
@@ -17,6 +18,14 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
+
+SECONDS_PER_NODE, SECONDS_PER_PIXEL = 1.3e-3, 2e-6
+"""What the fit of a trace takes on one core, roughly [s]."""
+
+LONG = 10.0
+"""Time from which on it is announced [s]."""
+
+log = logging.getLogger(__name__)
 
 
 def draw_regions(problem: Problem, run: Run) -> Fit:
@@ -43,10 +52,25 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     def simpler(drawing: Drawing, price: float) -> Sketch:
         return _sketch(problem, run, finish(drawing, next(parts), price=price * byte_price(settings)))
 
-    first = sketch_of(finish(trace_regions(problem, most), next(parts), tidy=settings.tidy), most)
+    traced = trace_regions(problem, most)
+    if settings.time_budget is None:
+        warn_if_long(traced, problem)
+    first = sketch_of(finish(traced, next(parts), tidy=settings.tidy), most)
     if not limit or first.size <= limit:
         return first.fit
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
+
+
+def warn_if_long(traced: Drawing, problem: Problem) -> None:
+    """Say so if the fit of a traced drawing will take long, and what makes it shorter."""
+    nodes, (width, height) = len(traced.joints) // 3, problem.size
+    seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
+    if seconds > LONG:
+        log.warning(
+            "a drawing of %s nodes takes about %.0f s; --time-budget or --quality draft make it shorter",
+            f"{nodes:,}",
+            seconds,
+        )
 
 
 def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:

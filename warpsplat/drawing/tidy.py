@@ -108,6 +108,8 @@ def finish_drawing(
         exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
         if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
+    if run.over():
+        return Finished(fit.drawing, min(DRAFT_GRID, finest))
     grid = drawing_grid(fit, finest, price)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
