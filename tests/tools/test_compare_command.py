@@ -144,7 +144,7 @@ def test_wrong_requests_are_one_line_before_any_work(
 ) -> None:
     use(monkeypatch)
     monkeypatch.chdir(image.parent)
-    monkeypatch.setattr("warpsplat.run.strategies.fit", None)
+    monkeypatch.setattr("warpsplat.fit.loop.fit", None)
     Path("text.png").write_text("no image")
     Image.new("RGB", (9, 9)).save("photo.jpg")
     before = set(Path().iterdir())

@@ -22,6 +22,9 @@ SAME_COORDINATE = 1e-3
 MAX_LEVERAGE = 8.0
 """Maximum length of a handle that a line directs, in lengths of the line: rounding rotates longer ones."""
 
+HELD_LEVERAGE = 1.0
+"""The same where points are held after they were rounded."""
+
 MIN_LENGTH = 1e-6
 """[canvas units] shorter vectors have no direction."""
 
@@ -117,7 +120,7 @@ class Constraints:
         self._is_line = drawing.lines()
         on = points[:, 0]
         tied = self._is_line[:, None] & (np.abs(on - on[self._next]) < SAME_COORDINATE)
-        self._find_joints(drawing, points)
+        self._find_joints(drawing, points, MAX_LEVERAGE if held is None else HELD_LEVERAGE)
         self._name_coordinates(tied)
         size = np.array([scene.canvas.width, scene.canvas.height])
         pinned = np.minimum(np.abs(points), np.abs(points - size)) < SAME_COORDINATE
@@ -129,7 +132,7 @@ class Constraints:
         self._pinned = np.zeros(6 * count, np.bool_)
         self._pinned[self._name[pinned.ravel()]] = True
 
-    def _find_joints(self, drawing: Drawing, points: Floats) -> None:
+    def _find_joints(self, drawing: Drawing, points: Floats, leverage: float) -> None:
         """Find the smooth joints that direct handles, and those whose tangents are level or upright."""
         on, before, line = points[:, 0], self._previous, self._is_line
         self._free = ~np.stack([line[before], line], axis=1)
@@ -137,7 +140,7 @@ class Constraints:
         ends = np.where(self._free[..., None], ends, np.stack([on[before], on[self._next]], axis=1))
         reach = np.linalg.norm(ends - on[:, None], axis=2)
         free = np.where(self._free, reach, 0).max(axis=1)
-        turned = ~self._free.all(axis=1) & (free > MAX_LEVERAGE * np.where(self._free, 0, reach).max(axis=1))
+        turned = ~self._free.all(axis=1) & (free > leverage * np.where(self._free, 0, reach).max(axis=1))
         smooth = (drawing.joints[::3] == Joint.SMOOTH) & self._free.any(axis=1) & ~turned
         level = smooth[:, None] & (np.abs(ends - on[:, None]) < SAME_COORDINATE).all(axis=1)
         self._level = level
@@ -189,9 +192,13 @@ class Constraints:
         length = np.linalg.norm(axis, axis=1)[:, None]
         return np.asarray(np.where(length > MIN_LENGTH, axis / np.maximum(length, MIN_LENGTH), 0.0))
 
+    def shared(self, points: Floats) -> Floats:
+        """Return ``points``, shape (point, 2), with the coordinates that they have in common."""
+        return points.ravel()[self._name].reshape(-1, 2)
+
     def project(self, points: Floats) -> Floats:
         """Return ``points``, shape (point, 2), with the constraints kept exactly."""
-        points = points.ravel()[self._name].reshape(-1, 2)
+        points = self.shared(points)
         along = np.zeros((len(points) // 3, 2))
         along[self._bent] = self.directions(points)
         for side, sign in ((0, -1.0), (1, 1.0)):

@@ -17,6 +17,7 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import psnr_of_file
+from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
@@ -25,6 +26,9 @@ LEAST_ORIGINAL_SIDE = 96
 
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
+
+DEAREST = 64.0
+"""Price of a byte over its usual one with the least detail; with the most it is one over that."""
 
 
 def draft_regions(problem: Problem, run: Run) -> Fit:
@@ -42,12 +46,19 @@ def draft_regions(problem: Problem, run: Run) -> Fit:
     return replace(best, interrupted=run.stopped())
 
 
+def byte_price(settings: Settings) -> float:
+    """Return the price of a byte over its usual one that ``detail`` stands for: 1 for a half."""
+    return float(elementary.exp((1 - 2 * settings.detail) * elementary.log(DEAREST)))
+
+
 def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
     """Trace an image; one of few rows or columns also continued beyond its borders, or as cells."""
     size, settings = enlargement(problem.target), problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        scene = trace(continued(original(problem.target), across, down), most=most).scene
+        scene = trace(
+            continued(original(problem.target), across, down), most=most, price=byte_price(settings)
+        ).scene
         if settings.is_limited:
             scene = limited(scene.take(solid_shapes(scene)), settings)
         scene = enlarged(cut(scene, across, down), size, *problem.size)

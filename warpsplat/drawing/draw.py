@@ -7,7 +7,7 @@ from functools import partial
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.draft import as_fit, draw_pixels, enlargement, limited, original
+from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, enlargement, limited, original
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.trace import trace
@@ -25,7 +25,11 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     most = None if settings.simplify else settings.curves
     parts = run.open_parts(share=0.5 if limit else 1.0)
     finish = partial(
-        finish_drawing, original(problem.target), finest=finest(settings), symbols=settings.symbols
+        finish_drawing,
+        original(problem.target),
+        finest=finest(settings),
+        price=byte_price(settings),
+        symbols=settings.symbols,
     )
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
@@ -37,7 +41,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         return sketch_of(finish(trace_regions(problem, count), next(parts), tidy=settings.tidy), count)
 
     def simpler(drawing: Drawing, price: float) -> Sketch:
-        return _sketch(problem, run, finish(drawing, next(parts), price=price))
+        return _sketch(problem, run, finish(drawing, next(parts), price=price * byte_price(settings)))
 
     first = sketch_of(finish(trace_regions(problem, most), next(parts), tidy=settings.tidy), most)
     if not limit or first.size <= limit:
@@ -60,7 +64,8 @@ def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     wide = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     drawing, grid = trace_regions(wide, most), finest(settings)
-    done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy)
+    price = byte_price(settings)
+    done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price)
     made = _sketch(wide, run, done).fit
     return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
 
@@ -71,7 +76,7 @@ def trace_regions(problem: Problem, most: int | None) -> Drawing:
     ``most``: regions.
     """
     settings = problem.settings
-    traced = trace(original(problem.target), most=most)
+    traced = trace(original(problem.target), most=most, price=byte_price(settings))
     drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))

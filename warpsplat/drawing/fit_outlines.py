@@ -25,7 +25,7 @@ LEAST_GAIN, MOST_IDLE = 0.005, 4
 DAMPING, RAISED = 0.03, 0.3
 """Added curvature, as a share, at first, and where a step did not lower the error: more of it gets stuck."""
 
-LEAST_DAMPING, CALMER = 0.01, 0.1
+LEAST_DAMPING, CALMER = 0.002, 0.1
 """The least of it, and its factor where a step lowered the error."""
 
 MOST_STEP = 0.7
@@ -33,6 +33,9 @@ MOST_STEP = 0.7
 
 FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
 """First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
+
+BLURRED_STEP = 2.0
+"""By how much blurred gradients are too small."""
 
 LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
@@ -128,17 +131,21 @@ class OutlineFit:
 
     def hold(self, points: Floats, held: Flags) -> None:
         """Begin again at ``points``; those that are ``held``, shape (point,), stay there from now on."""
+        points = self._constraints.shared(points)
         drawing = replace(self._drawing, scene=replace(self._drawing.scene, points=points.astype(np.float32)))
         self._constraints = Constraints(drawing, held)
         self.points = self._constraints.project(points)
         self.error, self._around = self._measure.error(self.points)
 
-    def advance(self, run: Run, steps: int = STEPS) -> None:
-        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over."""
+    def advance(self, run: Run, steps: int = STEPS, far: int = 0) -> None:
+        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over.
+
+        ``far``: first steps that follow the blurred residual.
+        """
         at, around, idle = self.points, self._around, 0
         damping = np.full(len(self._following), DAMPING)
         for done in range(1, steps + 1):
-            gradient = self._measure.gradient()
+            gradient = self._measure.gradient(blurred=done <= far)
             if self._paints:
                 self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0:
@@ -146,12 +153,14 @@ class OutlineFit:
             freedom = self._constraints.freedom(at)
             bending = Bending(self._measure.samples(at), self._following)
             change = newton_step(bending, freedom, gradient, damping, self._measure.least)
+            if done <= far:
+                change = BLURRED_STEP * change
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at = self._constraints.project(at + change.reshape(-1, 2))
             error, now = self._measure.error(at)
             damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED)
             around = now
-            idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
+            idle = 0 if done <= far or error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
                 self.points, self.error, self._around = at, error, now
                 if self._paints:

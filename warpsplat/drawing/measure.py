@@ -129,6 +129,7 @@ class Measure:
         self._parameters = Parameters(drawing.scene, backend)
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
+        self._tiles_x = viewport.tiles_x
         self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
         self._scale = 1 / (3 * viewport.pixel_count)
         self.least = LEAST_CONTRAST * self._scale
@@ -176,9 +177,14 @@ class Measure:
         total = self._rest + float(parts.sum(dtype=np.float64))
         return total * self._scale, self._near.sums(parts) * self._scale
 
-    def gradient(self) -> Floats:
-        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,)."""
-        self._back(self._by_image())
+    def gradient(self, *, blurred: bool = False) -> Floats:
+        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,).
+
+        ``blurred``: of the residual. An outline on the border of two pixels may already suit the one that it
+        comes from, and the error itself says nothing of the other one before it is there.
+        """
+        residual = self._blurred(self._residual) if blurred else self._residual
+        self._back(self._by_image(residual))
         return self._parameters.arrays["points_grad"].numpy().astype(np.float64).ravel()
 
     def look(self) -> None:
@@ -214,7 +220,7 @@ class Measure:
 
     def places(self, points: Floats) -> Samples:
         """Return samples at ``points``, those of the last ``error``, where the image has outlines."""
-        self._back(self._by_image())
+        self._back(self._by_image(self._residual))
         cubic, _, vertex, following = self._pieces()
         normal, _ = self._across(vertex, following)
         slope = (self._piece_grads(vertex) * normal[:, None]).sum(axis=2)
@@ -265,13 +271,36 @@ class Measure:
         self._renderer.film.buffers.image_grad.assign(self._grad)
         self._renderer.backward()
 
-    def _by_image(self) -> FloatArray:
+    def _by_image(self, residual: FloatArray) -> FloatArray:
         """Return the derivative of the mean squared error by the image."""
-        if self._residual.shape[1] == 3:
-            return self._residual * np.float32(2 * self._scale)
-        color, opacity = self._residual[:, :3], self._residual[:, 3:]
+        if residual.shape[1] == 3:
+            return residual * np.float32(2 * self._scale)
+        color, opacity = residual[:, :3], residual[:, 3:]
         back = 3 * opacity - color.sum(axis=1, keepdims=True)
         return np.concatenate([2 * color - opacity, back], axis=1) * np.float32(self._scale)
+
+    def _blurred(self, residual: FloatArray) -> FloatArray:
+        """Return ``residual`` blurred by 1/4, 1/2, 1/4 along both axes; beyond its tiles there is none."""
+        quarter = np.float32(0.25)
+        for axis in (2, 3):
+            values = np.swapaxes(residual, 0, axis)
+            blurred = 2 * quarter * values
+            blurred[1:] += quarter * values[:-1]
+            blurred[:-1] += quarter * values[1:]
+            for sign, edge, other in ((-1, 0, -1), (1, -1, 0)):
+                here, there = self._beside(axis, sign)
+                lines = np.swapaxes(blurred[edge], 0, axis - 1)
+                lines[here] += quarter * np.swapaxes(values[other], 0, axis - 1)[there]
+            residual = np.swapaxes(blurred, 0, axis)
+        return residual
+
+    def _beside(self, axis: int, sign: int) -> tuple[Links, Links]:
+        """Return which of the tiles have one beside them along an axis of tiles, and that one."""
+        wanted = self._tiles + sign * (1 if axis == 2 else self._tiles_x)
+        there = np.minimum(np.searchsorted(self._tiles, wanted), len(wanted) - 1)
+        in_row = wanted // self._tiles_x == self._tiles // self._tiles_x
+        here = np.flatnonzero((self._tiles[there] == wanted) & (in_row | (axis == 3)))
+        return here, there[here]
 
     def _channels(self) -> Iterator[FloatArray]:
         """Yield gradients of the image whose squares add up to the squared error's.

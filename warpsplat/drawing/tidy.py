@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
-from warpsplat.fit.rounding import STAGED_COST, byte_worth
+from warpsplat.fit.rounding import byte_worth
 from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
@@ -31,6 +32,9 @@ ROUNDS = 16
 FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
+FIRST_FAR, SECOND_FAR = 4, 3
+"""Steps at the beginning of the first two that look farther than to the next pixel's border."""
+
 LEAST_ERROR = 3e-5
 """Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
 that nobody would miss."""
@@ -38,8 +42,11 @@ that nobody would miss."""
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
-MEASURED_GRIDS = 2.0, DRAFT_GRID
+MEASURED_GRIDS = 3.0, 8.0, 20.0, 50.0
 """View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
+
+LASTING = 0.7
+"""Share of the error by rounding that is left once the handles have been refitted, measured."""
 
 WORTHWHILE = 0.004
 """Least share of the file's bytes that a round saves for another one to follow."""
@@ -76,22 +83,22 @@ def finish_drawing(
         target: sRGB in [0, 1], shape (height, width, 3); or premultiplied with opacity, shape (height,
             width, 4).
         drawing: as traced; or as it was finished at a lower price.
-        run: how the work is carried out; when it is over, the drawing is rounded as it is.
+        run: how the work is carried out; when it is over, the drawing stays as it is by then.
         finest: most view box units per pixel.
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
         symbols: whether nearly equal outlines become equal.
     """
     target = matching(target, drawing.scene.canvas)
-    if not len(drawing.scene):
+    if run.over() or not len(drawing.scene):
         return Finished(drawing, min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
-    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS)
+    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, price), run, fit.capacity)
-        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS)
+        fit = OutlineFit(target, tidied(fit, price, run.over), run, fit.capacity)
+        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
     equal: list[Equal] = []
-    if tidy:
+    if tidy and not run.over():
         fitted = fit.drawing
         exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
         if exact is not fitted:
@@ -133,7 +140,7 @@ def with_exact_shapes(
     return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
 
 
-def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
+def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool) -> Drawing:
     """Return a drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round edits that do not overlap are made together and the outlines fitted to where the image says
@@ -176,7 +183,7 @@ def tidied(fit: OutlineFit, price: float = 1.0) -> Drawing:
             stale, fit_before = touched(contour[left.at[~taken]], count), (moved, edited)
             left = left.take(taken)
         size -= int(left.saved.sum())
-        if left.saved.sum() < WORTHWHILE * first:
+        if left.saved.sum() < WORTHWHILE * first or over():
             break
     return drawing
 
@@ -190,14 +197,15 @@ def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    coarse, fine = (len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS)
-    worth = price * byte_worth(max(fit.error, LEAST_ERROR), fine)
+    sizes = [len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS]
+    digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
+    worth = price * byte_worth(max(fit.error, LEAST_ERROR), sizes[1])
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
         loss = float(model.errors(samples, low.cubics()).sum() - before)
-        doublings = elementary.log2(grid / MEASURED_GRIDS[0]) / elementary.log2(
-            MEASURED_GRIDS[1] / MEASURED_GRIDS[0]
-        )
-        costs[grid] = 2 * STAGED_COST * loss + worth * (fine - coarse) * doublings
+        k = min(sum(grid >= g for g in MEASURED_GRIDS[1:]), len(sizes) - 2)
+        slope = (sizes[k + 1] - sizes[k]) / (digits[k + 1] - digits[k])
+        size = sizes[k] + slope * (elementary.log2(grid) - digits[k])
+        costs[grid] = LASTING * loss + worth * size
     return min(costs, key=costs.__getitem__)

@@ -220,6 +220,9 @@ class Settings:
         metavar="SIZE",
         parse=parse_bytes,
     )
+    detail: float = option(
+        0.5, "Of drawings: from 0, few big shapes, to 1, every speck; other kinds ignore it.", FRACTION
+    )
     seed: int = option(0, "Random seed.", (0, 2**32 - 1))
     background: str = option(
         "auto",

@@ -55,6 +55,7 @@ def main() -> None:
     parser.add_argument("--id", action="append", default=[])
     parser.add_argument("--time-budget", type=int, default=0)
     parser.add_argument("--colors", type=int, default=0)
+    parser.add_argument("--detail", type=float, default=0.5)
     parser.add_argument("--subject", default="auto")
     given = parser.parse_known_args()[0]
     root = read(given.document)
@@ -62,7 +63,7 @@ def main() -> None:
     images = dict.fromkeys(image for element in chosen for image in element.iter(f"{SVG}image"))
     if not images:
         sys.exit("Select a bitmap first.")
-    options = [f"--subject={given.subject}"]
+    options = [f"--subject={given.subject}", f"--detail={given.detail}"]
     options += [f"--colors={given.colors}"] if given.colors else []
     options += [f"--time-budget={given.time_budget}s"] if given.time_budget else []
     limit = given.time_budget + GRACE if given.time_budget else None

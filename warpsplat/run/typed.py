@@ -41,6 +41,7 @@ class Options(RefineOptions, total=False):
     target_psnr: float | None
     max_bytes: int | str | None
     max_memory: int | str | None
+    detail: float | None
     seed: int | None
     size: str | None
     page: str | None

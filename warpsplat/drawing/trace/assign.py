@@ -70,8 +70,12 @@ def without_orphans(image: Floats, painted: Ints, fills: Floats, *, sure: Bools)
     return painted, fills
 
 
-def without_specks(image: Floats, painted: Ints, fills: Floats, noise: float) -> tuple[Ints, Floats, Bools]:
+def without_specks(
+    image: Floats, painted: Ints, fills: Floats, noise: float, price: float = 1.0
+) -> tuple[Ints, Floats, Bools]:
     """Give up small regions that are little more than mixtures of what is around them.
+
+    ``price``: as for ``find_regions``.
 
     Returns:
         ``painted``, ``fills``, and the pixels of these regions, without those that have the colour that they
@@ -90,7 +94,7 @@ def without_specks(image: Floats, painted: Ints, fills: Floats, noise: float) ->
         mixtures = unmix(image, others, fills, rows, columns, noise, reach)
         visible = np.maximum(mixtures.residual - (MIXED + noise), 0)
         owner = regions[rows, columns]
-        limit = np.maximum(INVISIBLE, INVISIBLE_PIXEL * np.minimum(sizes, MOST_COUNTED))
+        limit = np.maximum(INVISIBLE, INVISIBLE_PIXEL * np.minimum(sizes, MOST_COUNTED)) * min(price, 1)
         gone = (np.bincount(owner, visible, len(sizes)) <= limit)[owner]
         if noise:
             mixed = np.bincount(owner, visible == 0, len(sizes))

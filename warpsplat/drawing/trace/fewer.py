@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 import heapq
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints, Sets
 from warpsplat.drawing.trace.regions import Regions
+from warpsplat.fit.rounding import byte_worth
+
+LEAST_ERROR = 3e-5
+"""Mean squared error of a drawing without noise, sRGB in [0, 1]: 45 dB."""
 
 
 def fewer_regions(regions: Regions, most: int) -> Regions:
     """Merge regions, the pair that changes the image least first, until there are no more than ``most``."""
-    count = len(regions.paint)
-    if count <= most:
+    return regions if len(regions.paint) <= most else _merged(regions, most, math.inf)
+
+
+def worthwhile_regions(regions: Regions, price: float) -> Regions:
+    """Merge regions that show less than their bytes are worth beyond the usual ``price`` of 1.
+
+    All regions are taken to need as many bytes, so that no size has to be known.
+    """
+    if price <= 1:
         return regions
+    count, pixels = len(regions.paint), regions.labels.size
+    error = max(3 * 255**2 * LEAST_ERROR, 3 * regions.noise**2)
+    return _merged(regions, 1, (price - 1) * byte_worth(error * pixels, count))
+
+
+def _merged(regions: Regions, most: int, dearest: float) -> Regions:
+    """Merge regions until ``most`` are left, or a merge would add a squared error above ``dearest``."""
+    count = len(regions.paint)
     sizes = np.bincount(regions.labels.reshape(-1), minlength=count).tolist()
     colors = np.array([coloring.color for coloring in regions.colorings])[regions.paint]
-    merged = _merge(_neighbours(regions.labels), sizes, colors, most)
+    merged = _merge(_neighbours(regions.labels), sizes, colors, most, dearest)
     numbers = np.unique(merged, return_inverse=True)[1]
     labels = numbers[regions.labels].astype(np.int32)
     paint = np.zeros(int(numbers.max()) + 1, np.int32)
@@ -42,7 +62,7 @@ def _neighbours(labels: Ints) -> list[set[int]]:
     return beside
 
 
-def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int) -> Ints:
+def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, dearest: float) -> Ints:
     """Return for each region the one that it is merged into, or itself.
 
     Args:
@@ -50,6 +70,7 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int) 
         sizes: Pixels of each region; changed in place.
         colors: Shape (region, 4).
         most: Regions that are to be left.
+        dearest: Squared error that a merge may add [levels squared].
     """
     count = len(beside)
     sets = Sets(count)
@@ -67,7 +88,9 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int) 
         push(region)
     left, gone = count, [False] * count
     while left > most and heap:
-        _, region, into, size = heapq.heappop(heap)
+        cost, region, into, size = heapq.heappop(heap)
+        if cost > dearest:
+            break
         if gone[region]:
             continue
         if gone[into] or size != sizes[region]:

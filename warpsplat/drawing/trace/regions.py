@@ -44,11 +44,12 @@ class Regions:
     """Pixels along one of the image."""
 
 
-def find_regions(image: Floats) -> Regions:
+def find_regions(image: Floats, price: float = 1.0) -> Regions:
     """Cut an image up into regions.
 
     Args:
         image: Premultiplied sRGB with opacity, 0..255, shape (height, width, 4).
+        price: As for ``trace``; below 1, specks that are hardly seen stay.
     """
     image = np.asarray(image, np.float32)
     noise = noise_of(image)
@@ -63,7 +64,7 @@ def find_regions(image: Floats) -> Regions:
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = fill_gaps(image, parts)
     painted, fills = without_orphans(image, painted, fills, sure=parts.labels != NO_REGION)
-    painted, fills, given_up = without_specks(image, painted, fills, noise)
+    painted, fills, given_up = without_specks(image, painted, fills, noise, price)
     painted, fills = without_orphans(image, painted, fills, sure=~given_up)
     labels = components(painted, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)

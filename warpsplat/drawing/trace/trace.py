@@ -11,7 +11,7 @@ import numpy.typing as npt
 from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.fewer import fewer_regions
+from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
 from warpsplat.drawing.trace.grids import Bools, Floats
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.order import Tree, bare_ground, find_ranks, find_tree, has_inside
@@ -39,19 +39,22 @@ class Traced:
     """``Joint`` of each control point, shape (point,)."""
 
 
-def trace(image: FloatArray, *, most: int | None = None) -> Traced:
+def trace(image: FloatArray, *, most: int | None = None, price: float = 1.0) -> Traced:
     """Trace a drawing.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
         most: Paths at the most; the least visible regions are given up. None: no limit.
+        price: Of a byte, over its usual one: the higher, the fewer regions are worth theirs.
     """
     levels = np.asarray(image, np.float32) * 255
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     height, width = levels.shape[:2]
-    regions = fewer_regions(find_regions(levels), max(FEW_REGIONS, height * width // LEAST_AREA))
+    regions = find_regions(levels, price)
+    regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
+    regions = worthwhile_regions(regions, price)
     traced = trace_regions(regions, may_have_ground=is_opaque)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
