@@ -35,7 +35,7 @@ class Segment(NamedTuple):
 
 
 _Written = tuple[int, str, "_Written | None"]
-"""The length of path data so far, what was added last, and what is before: long ones are not copied each time."""
+"""The length of path data so far, what was added last, and what is before: nothing long is copied."""
 
 
 def _text(written: _Written | None) -> str:
