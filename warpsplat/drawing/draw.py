@@ -117,5 +117,5 @@ def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
 
 
 def _size(made: Fit, settings: Settings) -> int:
-    """Return the bytes of the file."""
-    return len(finished(made.scene, settings, made.per_pixel).encode())
+    """Return the bytes of the file; 0 where they are not limited, and do not count."""
+    return len(finished(made.scene, settings, made.per_pixel).encode()) if settings.max_bytes else 0

@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 ROUNDS = 12  # of Gauss and Newton's method
 STEP = 1e-4  # [px] of numeric derivatives
 DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
-TOGETHER = 64  # outlines that are fitted at once: their arrays stay in the processor's cache
+TOGETHER = 64  # outlines that are handled at once: their arrays stay in the processor's cache
 LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
 FIRST_REACH, LAST_REACH = (
     0.5,
@@ -68,7 +68,7 @@ FAMILIES = (
     Family(("x", "y", "side", "side"), 50, _pill),
     Family(("x", "y", "side", "side", "radius"), 56, _rounded),
 )
-"""Rectangles, circles, ellipses, and rectangles with round ends and with round corners: the smallest first."""
+"""Rectangles, circles, ellipses, and rectangles with round ends and with round corners, by their bytes."""
 
 
 def distances(points: Floats, half: Floats, radii: Floats) -> Floats:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
 from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, summed
-from warpsplat.drawing.primitive_fits import FAMILIES, Family, Fits, Samples, nearest, shape_of
+from warpsplat.drawing.primitive_fits import FAMILIES, TOGETHER, Family, Fits, Samples, nearest, shape_of
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
@@ -76,11 +76,6 @@ class Candidate:
         """The shape."""
         return shape_of(self.family, self.values, is_clockwise=self.is_clockwise)
 
-    @cached_property
-    def cells(self) -> Cells:
-        """The cells that it changes."""
-        return joined([*cells_around(self.cubics), *cells_around(self.made.cubics())])
-
 
 def with_shapes(
     target: FloatArray, drawing: Drawing, errors_of: Errors, errors: Floats, worth: float
@@ -95,16 +90,30 @@ def with_shapes(
         worth: Mean squared error that a byte is worth.
     """
     left = with_equal_values(_candidates(target, drawing, worth), worth)
+    cells = _cells(left)
     for _ in range(CHECKS):
         if not left:
             break
         made = _replaced(drawing, left)
         growth = errors_of(made) - errors
-        taken = [one for one in left if sum_within(growth, one.cells) <= one.saved * worth]
+        taken = [one for one in left if sum_within(growth, cells[one.contour]) <= one.saved * worth]
         if len(taken) == len(left):
             return made
         left = taken
     return drawing
+
+
+def _cells(candidates: Sequence[Candidate]) -> dict[int, Cells]:
+    """Return the cells that each candidate changes, by its contour."""
+    found = {}
+    for first in range(0, len(candidates), TOGETHER):
+        chosen = candidates[first : first + TOGETHER]
+        after = primitive_cubics([one.made for one in chosen])
+        cubics = [np.concatenate([one.cubics, own]) for one, own in zip(chosen, after, strict=True)]
+        around = iter(cells_around(np.concatenate(cubics)))
+        for one, own in zip(chosen, cubics, strict=True):
+            found[one.contour] = joined(list(itertools.islice(around, len(own))))
+    return found
 
 
 def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Candidate]:
@@ -274,8 +283,8 @@ def with_contours(
     """Return a drawing with other points and joints of some contours."""
     scene = drawing.scene
     starts = scene.starts.tolist()
-    points = [scene.points[a:b] for a, b in pairwise(starts)]
-    joints = [drawing.joints[a:b] for a, b in pairwise(starts)]
+    points = [scene.points[a:b] for a, b in itertools.pairwise(starts)]
+    joints = [drawing.joints[a:b] for a, b in itertools.pairwise(starts)]
     for contour, (own_points, own_joints) in contours.items():
         points[contour], joints[contour] = own_points.astype(np.float32), own_joints.astype(np.int32)
     after = starts_of(np.array([len(own) for own in points], np.int32))

@@ -34,19 +34,17 @@ class Segment(NamedTuple):
         return 2 * x - u, 2 * y - v
 
 
-class _Written(NamedTuple):
-    """Path data so far, as a linked list: a long contour is not copied with each segment."""
+_Written = tuple[int, str, "_Written | None"]
+"""The length of path data so far, what was added last, and what is before: nothing long is copied."""
 
-    length: int
-    added: str
-    before: _Written | None
 
-    def text(self) -> str:
-        parts, last = [self.added], self.before
-        while last:
-            parts.append(last.added)
-            last = last.before
-        return "".join(reversed(parts))
+def _text(written: _Written | None) -> str:
+    """Return path data."""
+    parts = []
+    while written:
+        _, added, written = written
+        parts.append(added)
+    return "".join(reversed(parts))
 
 
 def minus(a: Pair, b: Pair) -> Pair:
@@ -88,8 +86,11 @@ _Command = tuple[str, str, str]
 
 def _commands(segment: Segment, mirrored: Pair) -> list[_Command]:
     """Return the commands that draw ``segment``; ``mirrored``: the first handle of a smooth cubic."""
-    found = choices(segment, mirrored)
-    return [(letter, row(numbers, True), letter + row(numbers, False)) for letter, numbers in found]
+    found = []
+    for letter, numbers in choices(segment, mirrored):
+        text = row(numbers, False)
+        found.append((letter, text if numbers[0] < 0 else f" {text}", letter + text))
+    return found
 
 
 def shortest(pen: Pair | None, segments: Sequence[Segment]) -> str:
@@ -101,20 +102,25 @@ def shortest(pen: Pair | None, segments: Sequence[Segment]) -> str:
 
 def _shortest(pen: Pair | None, start: Pair, commands: Iterable[Sequence[_Command]]) -> str:
     """Return the shortest path data, given the commands that may draw each segment."""
-    moves = {"M": f"M{row(start, False)}", "m": f"m{row(minus(start, pen or (0, 0)), False)}"}
-    best = {letter: _Written(len(text), text, None) for letter, text in moves.items()}
+    moves = f"M{row(start, False)}", f"m{row(minus(start, pen or (0, 0)), False)}"
+    best: list[_Written] = [(len(text), text, None) for text in moves]
+    places = {IMPLIED[text[0]]: i for i, text in enumerate(moves)}  # in ``best``, by the letter to leave out
     for options in commands:
-        after: dict[str, _Written] = {}
-        for last, written in best.items():
-            implied, length = IMPLIED.get(last, last), written.length
-            for letter, repeated, full in options:
-                added = repeated if letter == implied else full
-                total = length + len(added)
-                if letter not in after or total < after[letter].length:
-                    after[letter] = _Written(total, added, written)
-        best = after
-    least = min(written.length for written in best.values())
-    return min(written.text() for written in best.values() if written.length == least)
+        lengths = [written[0] for written in best]
+        least = min(lengths)
+        first = lengths.index(least)
+        after: list[_Written] = []
+        for letter, repeated, full in options:
+            total, added, before = least + len(full), full, first
+            place = places.get(letter)
+            if place is not None:
+                other = lengths[place] + len(repeated)
+                if other < total or (other == total and place <= first):
+                    total, added, before = other, repeated, place
+            after.append((total, added, best[before]))
+        best, places = after, {option[0]: i for i, option in enumerate(options)}
+    least = min(written[0] for written in best)
+    return min(_text(written) for written in best if written[0] == least)
 
 
 STARTS = 4
@@ -137,7 +143,9 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
     found = []
     for _, start, i in sorted(promise)[:STARTS]:
         # No handle is mirrored behind the move.
-        rotated = [_commands(segments[i], start), *commands[i + 1 :], *commands[:i]]
+        is_same = segments[i].handles is None or behind[i].mirrored() == start
+        first = commands[i] if is_same else _commands(segments[i], start)
+        rotated = [first, *commands[i + 1 :], *commands[:i]]
         last = i - 1
         if behind[i].handles is None and len(rotated) > 1:
             rotated.pop()

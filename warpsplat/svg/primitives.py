@@ -60,6 +60,16 @@ class Primitive:
         """Return its arcs and sides, the first one an arc at the upper left, shape (piece, 4, 2)."""
         return cubics_of([self])[0]
 
+    def nodes(self) -> list[tuple[float, float]]:
+        """Return where its arcs and sides begin."""
+        (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
+        ends = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
+        ends += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
+        shown = [i for i in range(8) if (not self.is_round[i // 2 % 2] if i % 2 else rx > 0)]
+        if self.is_clockwise:
+            return [ends[i] for i in shown]
+        return [ends[(i + 1) % 8] for i in reversed(shown)]
+
     def element(self) -> str:
         """Return the element without brackets and style, such as ``circle cx="9" cy="9" r="5"``."""
         (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
@@ -79,7 +89,7 @@ class Primitive:
         ``pen``: where it is before, if any.
         """
         rx, ry = (round(r) for r in self.radii)
-        nodes = [(round(x), round(y)) for x, y in self.cubics()[:, 0].tolist()]
+        nodes = [(round(x), round(y)) for x, y in self.nodes()]
         start = nodes[0]
         steps = [minus(b, a) for a, b in zip(nodes, [*nodes[1:], start], strict=True)]
         if all(self.is_round):
@@ -153,10 +163,8 @@ def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, list[Primi
         x, y = points[..., 0], points[..., 1]
         turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
         chosen = np.flatnonzero(likely)
-        boxes = (own[chosen].tolist() for own in (low, high, radii, turning))
-        made = [
-            Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in zip(*boxes)
-        ]
+        boxes = zip(*(own[chosen].tolist() for own in (low, high, radii, turning)), strict=True)
+        made = [Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in boxes]
         near, turned = _turned(made, points[chosen])
         yield group.contours[chosen[near]], [made[i] for i in near.tolist()], turned
 
