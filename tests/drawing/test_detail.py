@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import byte_price
+from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.backend import Backend
 from warpsplat.scene import FloatArray
 
 SPECKS = [(x, y) for y in (8, 40, 72) for x in (10, 34, 58, 82)]
@@ -37,3 +41,10 @@ def test_dust_goes_first_and_nothing_else() -> None:
 
 def test_a_byte_costs_as_usual_by_default() -> None:
     assert byte_price(make_settings()) == 1
+
+
+def test_a_run_that_is_over_delivers_the_trace(device: str) -> None:
+    traced = trace(dusty())
+    run = Run(Backend.on(device), stop=lambda: True)
+    finished = finish_drawing(dusty(), Drawing(traced.scene, traced.joints), run)
+    assert finished.drawing.scene is traced.scene

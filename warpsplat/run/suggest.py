@@ -49,6 +49,9 @@ EXACT_PSNR = 58.0
 ROUNDING_SHARE = 0.05
 """Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
 
+SIMPLER = ", and --detail how small they may be"
+"""What else can be chosen for a drawing."""
+
 
 @dataclass(frozen=True)
 class Expected:
@@ -135,8 +138,8 @@ def suggest(
         if subject != "photo":
             seen = f" ({prepared.why})" if prepared.why else ""
             why = (
-                f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are. "
-                "--subject photo fits a number of shapes to it."
+                f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are"
+                f"{SIMPLER if subject == 'drawing' else ''}. --subject photo fits a number of shapes to it."
             )
             return Suggestion(None, subject, why, (), None, None, time.monotonic() - run.started)
         worth = survey(prepared.problem, run)
