@@ -60,7 +60,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
         return regions
     small = _mapped(painted, mixed, scale)
-    if _border(small) > MOST_FRAYED * scale * _border(painted):
+    if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
     fills = colors[small]
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
@@ -70,9 +70,9 @@ def with_sub_pixels(regions: Regions) -> Regions:
     return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
 
 
-def _border(painted: Ints) -> int:
+def _border(labels: Ints) -> int:
     """Return at how many places neighbours differ."""
-    return sum(int(np.count_nonzero(np.diff(painted, axis=axis))) for axis in (0, 1))
+    return sum(int(np.count_nonzero(np.diff(labels, axis=axis))) for axis in (0, 1))
 
 
 def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
