@@ -326,7 +326,11 @@ def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[in
     loops, last = stretches.layers.loops, stretches.cracks[begin + counts - 1]
     vertices[inner - 1] = loops.vertices[stretches.cracks[index]]
     vertices[first[1:] - 2] = vertices[first[1:] - 1] = loops.vertices[last]
-    # Something transparent may lie between regions as well as inside one.
-    holed = bool(stretches.layers.holed.any())
+    # Something transparent may lie between regions as well as inside one; what reaches the border of the
+    # image is not between them.
+    outer = np.repeat(loops.region, np.diff(loops.first))[loops.others == NO_REGION]
+    enclosed = stretches.layers.holed.copy()
+    enclosed[outer[outer != NO_REGION]] = False
+    holed = bool(enclosed.any())
     paths = HiddenPaths(stretches.layers.cover, stretches.rank[hidden], holed, first, goals, vertices)
     return dict(zip(hidden.tolist(), paths.corners(), strict=True))
