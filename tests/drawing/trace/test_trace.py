@@ -183,3 +183,13 @@ def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
     scene = trace_regions(regions).scene
     assert scene.canvas.background is not None
     assert len(scene) == 1
+
+
+def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them() -> None:
+    image = np.zeros((64, 64, 4), np.float32)
+    image[6:58, 6:58] = 0.1, 0.1, 0.1, 1
+    image[10:54, 10:54, :3] = 0.9, 0.2, 0.1
+    image[10:32, 10:40, :3] = 0.1, 0.6, 0.2
+    image[10:40, 40:54, :3] = 0.1, 0.3, 0.9
+    image[26:38, 26:44] = 0
+    assert render(trace(image).scene)[28:36, 28:42, 3].max() < 0.01
