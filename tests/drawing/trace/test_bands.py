@@ -27,6 +27,19 @@ def test_a_soft_shadow_is_a_few_bands() -> None:
     assert psnr(255 * render(scene), 255 * image) > 36  # a single gradient reaches 28
 
 
+def test_a_shadow_that_fades_away_is_kept() -> None:
+    """On a transparent ground, where it goes over into nothing."""
+    shade = np.zeros((96, 96), np.float32)
+    shade[40:80, 20:76] = 0.5
+    image = np.zeros((96, 96, 4), np.float32)
+    image[..., 3] = np.round(cv2.GaussianBlur(shade, (0, 0), 5) * 255) / 255
+    image[20:64, 20:76] = (0.2, 0.4, 0.9, 1)
+    shown = render(trace(image).scene)
+    assert shown.shape[2] == 4
+    assert np.sqrt(np.square(255 * (shown - image)[..., 3]).mean()) < 3
+    assert shown[:8].max() == 0, "nothing is painted where nothing was"
+
+
 def test_a_linear_gradient_stays_one_gradient() -> None:
     ramp = np.linspace(0.2, 0.9, 64, dtype=np.float32)
     image = np.round(np.broadcast_to(ramp[:, None], (64, 64, 3)) * 255).astype(np.float32) / 255
@@ -39,3 +52,10 @@ def test_a_slope_is_no_noise_but_grain_is() -> None:
     assert noise_of(image) < 0.5
     image[..., :3] += np.random.default_rng(0).normal(0, 4, (80, 80, 1))
     assert noise_of(image) > 3
+
+
+def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:
+    opacity = np.random.default_rng(0).normal(128, 6, (80, 80, 1)).astype(np.float32)
+    assert noise_of(np.repeat(opacity, 4, axis=2)) == 0  # white, not seen on white
+    dirt = np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)
+    assert noise_of(dirt) > 1

@@ -32,7 +32,8 @@ class Coloring:
     @property
     def is_clear(self) -> bool:
         """Whether nothing is painted."""
-        return float(self.color[3]) < CLEAR
+        opacity = self.color[3] if self.ramp is None else self.ramp.colors[:, 3].max()
+        return float(opacity) < CLEAR
 
 
 @dataclass(frozen=True)
