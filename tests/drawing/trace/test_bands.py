@@ -56,6 +56,6 @@ def test_a_slope_is_no_noise_but_grain_is() -> None:
 
 def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:
     opacity = np.random.default_rng(0).normal(128, 6, (80, 80, 1)).astype(np.float32)
-    assert noise_of(np.repeat(opacity, 4, axis=2)) == 0  # white, not seen on white
+    assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white
     dirt = np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)
     assert noise_of(dirt) > 1

@@ -12,20 +12,20 @@ from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
-from warpsplat.drawing.trace.grids import Bools, Floats
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.hidden import Cover
+from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import Tree, bare_ground, find_ranks, find_tree, has_inside
-from warpsplat.drawing.trace.outlines import find_boundary
+from warpsplat.drawing.trace.outlines import Boundary, find_boundary
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import Layers, find_outlines
+from warpsplat.drawing.trace.stack import Layers, Outline, find_outlines
 from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 
-OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
 LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
 FEW_REGIONS = 3000  # which any image may have
 
@@ -73,16 +73,20 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
     """
     regions = with_sub_pixels(regions)
-    loops = find_loops(regions.labels, regions.image)
-    boundary = find_boundary(loops, regions)
-    tree = find_tree(loops, len(regions.paint))
+    nesting, count = find_nesting(regions), len(regions.paint)
+    flat = replace(regions, labels=nesting.shown(0)[regions.labels])
+    loops = find_loops(flat.labels, flat.image)
+    boundary = find_boundary(loops, flat)
+    tree = find_tree(loops, count)
     unpainted, ground = _ground(regions, tree, may_have_ground=may_have_ground)
-    sizes = np.bincount(regions.labels.reshape(-1), minlength=len(regions.paint))
-    ranks = find_ranks(loops, tree, sizes, unpainted)
-    is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
-    hiding = np.where(is_opaque, ranks, -1)
-    cover = Cover(hiding[regions.labels])
-    outlines = find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
+    sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
+    ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
+    outlines = _outlines(flat, loops, boundary, tree, ranks)
+    for depth in range(1, int(nesting.depth.max()) + 1):
+        layer = replace(regions, labels=nesting.shown(depth)[regions.labels])
+        inner = find_loops(layer.labels, layer.image)
+        drawn = _outlines(layer, inner, find_boundary(inner, layer), find_tree(inner, count), ranks)
+        outlines += [(region, outline) for region, outline in drawn if nesting.depth[region] == depth]
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
     found = [
@@ -96,12 +100,22 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
         if len(contour.cubics) > 1:
             contours.setdefault(region, []).append(replace(contour, cubics=contour.cubics / regions.scale))
     shapes = [
-        Fill(regions.colorings[regions.paint[region]], contours[region])
+        Fill(nesting.colorings[region], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
     ]
     height, width = (side // regions.scale for side in regions.labels.shape)
     background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
     return _scene(Canvas(width, height, background), merged(shapes))
+
+
+def _outlines(
+    regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints
+) -> list[tuple[int, Outline]]:
+    """Return the contours of regions, which lie on one another by their ranks."""
+    is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
+    hiding = np.where(is_opaque, ranks, -1)
+    cover = Cover(hiding[regions.labels])
+    return find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
 
 
 TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve
