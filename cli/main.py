@@ -33,7 +33,7 @@ COMMANDS: dict[str, Command] = {
 """All commands: those of the core, then those of the extensions."""
 
 
-GARBAGE = 20_000
+GARBAGE = 500_000
 """Objects that are made, over those that are freed, before Python looks for cycles."""
 
 FOR_SVG = ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg")
