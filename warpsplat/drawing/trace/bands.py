@@ -94,7 +94,7 @@ def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
         error = float(flat[part]) if coloring.ramp is None else values * coloring.ramp.residual**2
         if error > values * least**2:
             box = boxes[part]
-            mask = parts.labels[box.index()] == part
+            mask = parts.labels[box.slices()] == part
             found.append(_Piece(box.left, box.top, mask, coloring, error))
     return found
 

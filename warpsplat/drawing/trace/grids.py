@@ -30,7 +30,7 @@ class Box(NamedTuple):
     """The column after the last one."""
     bottom: int
 
-    def index(self) -> tuple[slice, slice]:
+    def slices(self) -> tuple[slice, slice]:
         """Return what an array is indexed with to get these pixels."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 

@@ -65,7 +65,7 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
     colorings: list[Coloring] = []
     boxes = bounding_boxes(labels, count)
     for part in np.flatnonzero((residual > UNEVEN + UNEVEN_NOISE * noise) & is_large).tolist():
-        box = boxes[part].index()
+        box = boxes[part].slices()
         ramp = fit_ramp(image[box], labels[box] == part, boxes[part].left, boxes[part].top)
         if ramp is not None and ramp.residual < GAIN * float(residual[part]):
             paint[part] = len(colorings)

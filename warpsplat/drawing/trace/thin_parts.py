@@ -59,8 +59,8 @@ class _FlatColors(NamedTuple):
     numbers: list[int]
     colors: Floats
     """Shape (color, channel)."""
-    count: int
-    """Of all colourings."""
+    total: int
+    """Number of all colourings."""
 
     @staticmethod
     def of(colorings: list[Coloring]) -> _FlatColors:
@@ -191,20 +191,21 @@ def _matching_color(thin: _ThinPart, flat: _FlatColors, near: list[int], limit: 
     ``near`` them but their share of it is small, they are the tip of its region, too faint to show.
     """
     if not flat.numbers:
-        return flat.count
+        return flat.total
     top = thin.least_mixed(0.5)
     share, off = _shares(thin.colors[top], thin.bases[top], flat.colors)
     fits = np.count_nonzero(off <= limit, axis=0) >= int(MATCHING * (len(off) - 1))
-    fits[fits] = np.quantile(off[:, fits], MATCHING, axis=0) <= limit
+    if fits.any():
+        fits[fits] = np.quantile(off[:, fits], MATCHING, axis=0) <= limit
     largest = share.max(axis=0)
     clear = fits & (largest >= CLEARLY)
     if clear.any():
         return flat.numbers[int(np.where(clear, largest, -np.inf).argmax())]
-    return None if any(fits[flat.numbers.index(i)] for i in near) else flat.count
+    return None if any(fits[flat.numbers.index(i)] for i in near) else flat.total
 
 
 def _shares(pixels: Floats, bases: Floats, colors: Floats) -> tuple[Floats, Floats]:
-    """Return the share of each colour in each pixel beside its base, and how far off that mixture is [levels].
+    """Return the share of each colour in each pixel beside its base, and how far off that mixture is.
 
     Args:
         pixels: Shape (pixel, channel).
