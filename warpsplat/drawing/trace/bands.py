@@ -83,10 +83,10 @@ def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
     """Return the parts that are off their colouring by more than ``least`` in the root mean square."""
     found = []
     sizes = np.bincount(parts.labels[parts.labels >= 0], minlength=len(parts.paint))
-    off = np.where((parts.labels >= 0)[..., None], image - parts.fills, 0)
-    flat = np.bincount(
-        np.maximum(parts.labels, 0).reshape(-1), (off**2).sum(axis=2).reshape(-1), len(parts.paint)
-    )
+    # Channel by channel: sums along an axis of four take ten times as long.
+    off = sum(channel**2 for channel in np.moveaxis(image - parts.fills, 2, 0))
+    off = np.where(parts.labels >= 0, off, 0)
+    flat = np.bincount(np.maximum(parts.labels, 0).reshape(-1), off.reshape(-1), len(parts.paint))
     boxes = bounding_boxes(parts.labels, len(parts.paint))
     for part in np.flatnonzero(sizes >= 2 * LEAST_BAND).tolist():
         coloring = parts.colorings[parts.paint[part]]
