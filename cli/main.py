@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import difflib
 import gc
@@ -32,7 +33,7 @@ COMMANDS: dict[str, Command] = {
 """All commands: those of the core, then those of the extensions."""
 
 
-GARBAGE = 20_000
+GARBAGE = 500_000
 """Objects that are made, over those that are freed, before Python looks for cycles."""
 
 FOR_SVG = ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg")
@@ -117,6 +118,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # The objects of all imports are checked for cycles again and again: a quarter of the time that they take.
     gc.set_threshold(GARBAGE)
+    # As the process ends, the objects of all modules would be checked once more: a quarter of a second.
+    atexit.register(gc.freeze)
     code: Any = ExitCode.INTERNAL
     given = sys.argv[1:] if arguments is None else arguments
     try:

@@ -13,7 +13,6 @@ import hashlib
 import os
 import platform
 import re
-import secrets
 import stat
 import sys
 import time
@@ -206,7 +205,7 @@ TEMPORARY = re.compile(r"\.warpsplat-([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{8}\.tmp")
 
 def _temporary(folder: Path) -> tuple[int, str]:
     """Create a file in ``folder``, open for writing, with the default permissions of new files."""
-    name = os.path.join(folder, f".warpsplat-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    name = os.path.join(folder, f".warpsplat-{_machine()}-{os.getpid()}-{os.urandom(4).hex()}.tmp")
     _unfinished.add(name)
     try:
         flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)

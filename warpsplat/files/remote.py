@@ -7,8 +7,8 @@ remote files have one type here. ``os.path`` cannot be used with it: check ``is_
 from __future__ import annotations
 
 import contextlib
+import os
 import re
-import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path, PurePath
@@ -115,7 +115,7 @@ def write_remote(path: Path, data: bytes) -> None:
         if there.protocol in WHOLE:
             there.fs.pipe_file(there.path, data)
             return
-        beside = there.with_name(f".warpsplat-{secrets.token_hex(4)}.tmp")
+        beside = there.with_name(f".warpsplat-{os.urandom(4).hex()}.tmp")
         there.fs.makedirs(there.parent.path, exist_ok=True)
         try:
             there.fs.pipe_file(beside.path, data)

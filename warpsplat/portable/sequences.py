@@ -14,16 +14,22 @@ def interp(x: Any, places: Any, values: Any) -> npt.NDArray[np.float64]:
     Args:
         x: Arguments, any shape.
         places: Arguments with given values, shape (n,), ascending.
-        values: The values there, shape (n,).
+        values: The values there, shape (n, ...).
+
+    Returns:
+        The shape of ``x``, with what ``values`` have after it.
     """
     x, places, values = (np.asarray(part, np.float64) for part in (x, places, values))
     if len(places) == 1:
-        return np.full_like(x, values[0])
+        return np.broadcast_to(values[0], x.shape + values.shape[1:]).copy()
     low = np.clip(np.searchsorted(places, x, side="right") - 1, 0, len(places) - 2)
     span = places[low + 1] - places[low]
     share = np.clip(x - places[low], 0.0, span) / np.where(span > 0, span, 1.0)
+    beyond = x >= places[low + 1]
+    if values.ndim > 1:
+        share, beyond = (each.reshape(x.shape + (1,) * (values.ndim - 1)) for each in (share, beyond))
     between = values[low] + share * (values[low + 1] - values[low])
-    return np.where(x >= places[low + 1], values[low + 1], between)[()]
+    return np.where(beyond, values[low + 1], between)[()]
 
 
 def convolve(signal: Any, kernel: Any) -> npt.NDArray[np.float64]:

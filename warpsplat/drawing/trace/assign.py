@@ -9,7 +9,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, components
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, components
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
 from warpsplat.drawing.trace.palette import Parts
 
@@ -60,7 +60,7 @@ def without_orphans(image: Floats, painted: Ints, fills: Floats, *, sure: Bools)
         source = rows * width + columns
         for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
             y, x = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
-            off = np.abs(image[rows, columns] - fills[y, x]).max(axis=1)
+            off = channel_max(np.abs(image[rows, columns] - fills[y, x]))
             better = ~orphan[y, x] & (off < best)
             best[better], source[better] = off[better], (y * width + x)[better]
         painted[rows, columns] = painted.reshape(-1)[source]
@@ -101,7 +101,7 @@ def without_specks(
             gone |= (mixed >= MOSTLY * sizes)[owner] & (visible == 0)
         rows, columns, label = rows[gone], columns[gone], mixtures.label[gone]
         # A pixel of a pure colour is intended, even if the region of that colour lies beyond a line.
-        off = np.abs(image[rows, columns] - fills[rows, columns]).max(axis=1)
+        off = channel_max(np.abs(image[rows, columns] - fills[rows, columns]))
         own = (label == painted[rows, columns]) & (off <= MIXED + noise)
         painted[rows, columns], fills[rows, columns] = label, mixtures.color[gone]
         given_up[rows[~own], columns[~own]] = True

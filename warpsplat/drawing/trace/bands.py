@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, bounding_boxes
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.portable import filters
@@ -83,19 +83,19 @@ def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
     """Return the parts that are off their colouring by more than ``least`` in the root mean square."""
     found = []
     sizes = np.bincount(parts.labels[parts.labels >= 0], minlength=len(parts.paint))
-    off = np.where((parts.labels >= 0)[..., None], image - parts.fills, 0)
-    flat = np.bincount(
-        np.maximum(parts.labels, 0).reshape(-1), (off**2).sum(axis=2).reshape(-1), len(parts.paint)
-    )
+    # Channel by channel: sums along an axis of four take ten times as long.
+    off = sum(channel**2 for channel in np.moveaxis(image - parts.fills, 2, 0))
+    off = np.where(parts.labels >= 0, off, 0)
+    flat = np.bincount(np.maximum(parts.labels, 0).reshape(-1), off.reshape(-1), len(parts.paint))
+    boxes = bounding_boxes(parts.labels, len(parts.paint))
     for part in np.flatnonzero(sizes >= 2 * LEAST_BAND).tolist():
         coloring = parts.colorings[parts.paint[part]]
         values = int(sizes[part]) * image.shape[2]
         error = float(flat[part]) if coloring.ramp is None else values * coloring.ramp.residual**2
         if error > values * least**2:
-            mask = parts.labels == part
-            left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-            mask = mask[top : top + height, left : left + width]
-            found.append(_Piece(left, top, mask, coloring, error))
+            box = boxes[part]
+            mask = parts.labels[box.slices()] == part
+            found.append(_Piece(box.left, box.top, mask, coloring, error))
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -19,6 +19,37 @@ NO_REGION = -1
 """Label of a pixel that is in no region, and of everything outside the image."""
 
 SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
+
+
+class Box(NamedTuple):
+    """A rectangle of pixels."""
+
+    left: int
+    top: int
+    right: int
+    """The column after the last one."""
+    bottom: int
+
+    def slices(self) -> tuple[slice, slice]:
+        """Return what an array is indexed with to get these pixels."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+
+def bounding_boxes(labels: Ints, count: int) -> list[Box]:
+    """Return the box around the pixels of each label from 0 to ``count`` - 1; all are there.
+
+    ``labels``: shape (height, width), negative outside.
+    """
+    sides = []
+    for lines in (labels, labels.T):
+        inside = lines >= 0
+        owners, places = lines[inside], np.nonzero(inside)[0]
+        low, high = np.zeros(count, np.intp), np.zeros(count, np.intp)
+        # Of several values for one element the last one stays.
+        low[owners[::-1]], high[owners] = places[::-1], places + 1
+        sides += [low.tolist(), high.tolist()]
+    top, bottom, left, right = sides
+    return [Box(*box) for box in zip(left, top, right, bottom, strict=True)]
 
 
 def channel_max(values: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -28,12 +29,18 @@ class Cover:
     ranks: Ints
     """Rank of what is painted at each pixel, -1 where that hides nothing; shape (height, width)."""
 
+    @cached_property
+    def _framed(self) -> Ints:
+        """The ranks with a frame of pixels that hide all, shape (height + 2, width + 2)."""
+        return np.pad(self.ranks, 1, constant_values=np.iinfo(self.ranks.dtype).max)
+
     def hides(self, rank: Ints, points: Floats) -> Bools:
         """Return whether regions of these ranks are hidden at points, shape (point, 2); outside, all are."""
-        height, width = self.ranks.shape
-        x, y = np.floor(points).astype(np.intp).T
-        outside = (x < 0) | (x >= width) | (y < 0) | (y >= height)
-        return outside | (self.ranks[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)] > rank)
+        x, y = (
+            np.minimum(np.maximum(np.floor(places).astype(np.intp), -1), size) + 1
+            for places, size in zip(points.T, self.ranks.shape[::-1], strict=True)
+        )
+        return np.asarray(self._framed[y, x] > rank)
 
     def hides_lines(self, rank: Ints, start: Floats, end: Floats) -> Bools:
         """Return whether straight lines with a margin are hidden, their ends aside; shape (line,)."""
@@ -52,10 +59,10 @@ class Cover:
         normal = MARGIN * np.stack([-unit[:, 1], unit[:, 0]], axis=1)[line]
         ranks = rank[lines][line]
         is_inner = (number > 0) & (number < counts[line] - 1)
-        seen = ~self.hides(ranks, points)
-        for beside in (normal, -normal):
-            seen |= is_inner & ~self.hides(ranks, points + beside)
-        hidden[lines] = np.bincount(line, seen, len(lines)) == 0
+        inner = np.flatnonzero(is_inner)
+        places = np.concatenate([points, points[inner] + normal[inner], points[inner] - normal[inner]])
+        seen = ~self.hides(np.concatenate([ranks, ranks[inner], ranks[inner]]), places)
+        hidden[lines] = np.bincount(np.concatenate([line, line[inner], line[inner]]), seen, len(lines)) == 0
         return hidden
 
     def hides_polygon(self, rank: int, polygon: Floats) -> bool:

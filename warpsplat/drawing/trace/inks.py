@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, dilated, eroded
+from warpsplat.drawing.trace.grids import Bools, Floats, channel_max, dilated, eroded
 from warpsplat.drawing.trace.mixtures import MIXED
 from warpsplat.drawing.trace.regions import Regions
 
@@ -46,7 +46,7 @@ def with_inks(regions: Regions) -> Regions:
 
 def _is_solid(image: Floats, own: Bools, color: Floats) -> bool:
     """Return whether a colour covers an area, or a line as long as no letter's."""
-    exact = own & (np.abs(image - color).max(axis=2) <= MIXED)
+    exact = own & (channel_max(np.abs(image - color)) <= MIXED)
     if eroded(exact, 3).any():
         return True
     _, _, stats, _ = cv2.connectedComponentsWithStats(exact.astype(np.uint8), connectivity=8)

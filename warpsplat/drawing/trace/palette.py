@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, bounding_boxes, channel_max
 from warpsplat.drawing.trace.ramps import Ramp, fit_ramp
 
 CLEAR = 2.5  # [levels] opacity below which nothing is painted
@@ -65,11 +64,10 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
     is_large = sizes >= (LEAST_RAMP if noise == 0 else LEAST_NOISY_RAMP)
     paint = np.full(count, NO_REGION, np.int32)
     colorings: list[Coloring] = []
+    boxes = bounding_boxes(labels, count)
     for part in np.flatnonzero((residual > UNEVEN + UNEVEN_NOISE * noise) & is_large).tolist():
-        mask = labels == part
-        left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-        box = slice(top, top + height), slice(left, left + width)
-        ramp = fit_ramp(image[box], mask[box], left, top)
+        box = boxes[part].slices()
+        ramp = fit_ramp(image[box], labels[box] == part, boxes[part].left, boxes[part].top)
         if ramp is not None and ramp.residual < GAIN * float(residual[part]):
             paint[part] = len(colorings)
             colorings.append(Coloring(means[part], ramp))

@@ -127,12 +127,8 @@ def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
     known = np.concatenate([[True], (seen[1:] + seen[:-1]) > 0, [True]])
     offsets = _fewest(knots[known], fine[known])
     stops = _least_squares(t, colors, offsets)
-    residual = float(np.sqrt(np.mean((_interpolated(t, offsets, stops) - colors) ** 2)))
+    residual = float(np.sqrt(np.mean((interp(t, offsets, stops) - colors) ** 2)))
     return offsets, np.clip(stops, 0, 255), residual
-
-
-def _interpolated(t: Floats, offsets: Floats, colors: Floats) -> Floats:
-    return np.stack([interp(t, offsets, channel) for channel in colors.T], axis=1)
 
 
 def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
@@ -163,7 +159,7 @@ def _fewest(knots: Floats, values: Floats) -> Floats:
     chosen = {0, len(knots) - 1}
     while len(chosen) < MOST_STOPS:
         order = sorted(chosen)
-        off = np.abs(_interpolated(knots, knots[order], values[order]) - values).max(axis=1)
+        off = np.abs(interp(knots, knots[order], values[order]) - values).max(axis=1)
         worst = int(off.argmax())
         if off[worst] <= OFF:
             break

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats, Ints, components, dilated
+from warpsplat.drawing.trace.grids import Floats, Ints, channel_max, components, dilated
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.mixtures import DISTANCE_COST, MIXED
 from warpsplat.drawing.trace.regions import Regions
@@ -87,13 +87,13 @@ def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
             rows, columns = np.nonzero((distances[a] < NEAR) & (distances[b] < NEAR))
             between, away = colors[a] - colors[b], regions.image[rows, columns] - colors[b]
             t = np.clip((away * between).sum(axis=1) / max(float((between**2).sum()), 1e-6), 0, 1)
-            off = np.abs(away - t[:, None] * between).max(axis=1, initial=0)
+            off = channel_max(np.abs(away - t[:, None] * between))
             off += DISTANCE_COST * (distances[a] + distances[b])[rows, columns]
             better = off < cost[rows, columns]
             at = rows[better], columns[better]
             cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
     most = np.where(share >= 0.5, first, second)
-    is_pure = np.abs(regions.image - colors[most]).max(axis=2) <= MIXED
+    is_pure = channel_max(np.abs(regions.image - colors[most])) <= MIXED
     rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE) & ~is_pure)
     at = rows, columns
     return most, _Mixed(rows, columns, first[at], second[at], share[at])
@@ -103,7 +103,7 @@ def _foreign_share(regions: Regions, mixed: _Mixed, colors: Floats) -> float:
     """Return the share of the mixed pixels that are not mixed of two colours."""
     share = mixed.share[:, None]
     expected = share * colors[mixed.first] + (1 - share) * colors[mixed.second]
-    off = np.abs(regions.image[mixed.rows, mixed.columns] - expected).max(axis=1)
+    off = channel_max(np.abs(regions.image[mixed.rows, mixed.columns] - expected))
     return float((off > MIXED).mean()) if len(off) else 0.0
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts
 
@@ -23,6 +26,7 @@ OTHER_COLOR = 64.0  # [levels] a pixel this far off the part's mixtures has anot
 NO_EVIDENCE = 256  # [levels] residual where there is no region nearby
 NEARBY = 5  # [px] how far from a thin part the colours lie that it may be mixed of
 MOST_COLORS = 8  # of which triples are tried
+MATCHING = 0.8  # share of the least mixed pixels that must be mixed of a colour for it to match
 CLEARLY = 0.4  # share of a colour that some pixel must have, for the part to have this colour
 
 
@@ -41,8 +45,28 @@ class _ThinPart:
 
     def typical_color(self) -> Floats:
         """Return the median colour of the quarter of the pixels that are least mixed."""
-        least_mixed = self.residuals >= np.quantile(self.residuals, 0.75)
-        return np.round(np.median(self.colors[least_mixed], axis=0))
+        return np.round(np.median(self.colors[self.least_mixed(0.25)], axis=0))
+
+    def least_mixed(self, share: float) -> Bools:
+        """Return the pixels that are least mixed, shape (pixel,); ``share``: of all, about."""
+        place = math.ceil((1 - share) * (len(self.residuals) - 1))
+        return np.asarray(self.residuals >= np.sort(self.residuals)[place])
+
+
+class _FlatColors(NamedTuple):
+    """The flat ones of some colourings."""
+
+    numbers: list[int]
+    colors: Floats
+    """Shape (color, channel)."""
+    total: int
+    """Number of all colourings."""
+
+    @staticmethod
+    def of(colorings: list[Coloring]) -> _FlatColors:
+        """Return those of ``colorings``."""
+        numbers = [i for i, coloring in enumerate(colorings) if coloring.ramp is None]
+        return _FlatColors(numbers, np.array([colorings[i].color for i in numbers]), len(colorings))
 
 
 def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
@@ -91,6 +115,7 @@ def _round(
     unexplained, other = residual > limit, np.zeros_like(waiting)
     labels, fills = parts.labels.copy(), parts.fills.copy()
     paint, colorings = parts.paint.tolist(), list(parts.colorings)
+    flat = _FlatColors.of(colorings)
     for y, x in _components_by_size(unexplained):
         thin = _ThinPart(y, x, image[y, x], bases[y, x], residual[y, x])
         near = _flat_colors_near(labels, parts.paint, thin, colorings)
@@ -99,15 +124,16 @@ def _round(
             or thin.residuals.max() < FAINT
         ):
             continue
-        chosen = _matching_color(thin, colorings, near, limit)
+        chosen = _matching_color(thin, flat, near, limit)
         if chosen is None or (chosen == len(colorings) and not new_colors):
             continue
         if chosen == len(colorings):
             colorings.append(Coloring(thin.typical_color()))
+            flat = _FlatColors.of(colorings)
         color = colorings[chosen].color
         toward, away = color - thin.bases, thin.colors - thin.bases
         share = (away * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1)
-        off = np.abs(away - np.clip(share, 0, 1)[:, None] * toward).max(axis=1)
+        off = channel_max(np.abs(away - np.clip(share, 0, 1)[:, None] * toward))
         own = share >= min(COVERED, COVERED_OF_MOST * float(share.max()))
         other[y, x] = own & (off > OTHER_COLOR)
         labels[y[own], x[own]] = len(paint)
@@ -158,23 +184,42 @@ def _is_mixture_of_three(pixels: Floats, colors: list[Floats], limit: float) -> 
     return bool(((off <= limit) & inside).any(axis=0).all())
 
 
-def _matching_color(thin: _ThinPart, colorings: list[Coloring], near: list[int], limit: float) -> int | None:
+def _matching_color(thin: _ThinPart, flat: _FlatColors, near: list[int], limit: float) -> int | None:
     """Return the number of a thin part's colouring, one more than there are for a new one; None for no part.
 
     A known colour matches if the pixels lie between what is beside them and that colour. If that is a colour
     ``near`` them but their share of it is small, they are the tip of its region, too faint to show.
     """
-    flat = [i for i, coloring in enumerate(colorings) if coloring.ramp is None]
-    if not flat:
-        return len(colorings)
-    top = thin.residuals >= np.quantile(thin.residuals, 0.5)
-    base = thin.bases[top][:, None]
-    toward, away = np.array([colorings[i].color for i in flat])[None] - base, thin.colors[top][:, None] - base
-    share = (away * toward).sum(axis=2) / np.maximum((toward**2).sum(axis=2), 1)
-    off = np.abs(away - np.clip(share, 0, 1)[..., None] * toward).max(axis=2)
-    fits = np.quantile(off, 0.8, axis=0) <= limit
+    if not flat.numbers:
+        return flat.total
+    top = thin.least_mixed(0.5)
+    share, off = _shares(thin.colors[top], thin.bases[top], flat.colors)
+    fits = np.count_nonzero(off <= limit, axis=0) >= int(MATCHING * (len(off) - 1))
+    if fits.any():
+        fits[fits] = np.quantile(off[:, fits], MATCHING, axis=0) <= limit
     largest = share.max(axis=0)
     clear = fits & (largest >= CLEARLY)
     if clear.any():
-        return flat[int(np.where(clear, largest, -np.inf).argmax())]
-    return None if any(fits[flat.index(i)] for i in near) else len(colorings)
+        return flat.numbers[int(np.where(clear, largest, -np.inf).argmax())]
+    return None if any(fits[flat.numbers.index(i)] for i in near) else flat.total
+
+
+def _shares(pixels: Floats, bases: Floats, colors: Floats) -> tuple[Floats, Floats]:
+    """Return the share of each colour in each pixel beside its base, and how far off that mixture is.
+
+    Args:
+        pixels: Shape (pixel, channel).
+        bases: What they are mixed with, shape (pixel, channel).
+        colors: Shape (color, channel).
+
+    Returns:
+        Shape (pixel, color), both.
+    """
+    # Channel by channel: sums along an axis of four take ten times as long.
+    toward = [color - base[:, None] for color, base in zip(colors.T, bases.T, strict=True)]
+    away = [channel[:, None] for channel in (pixels - bases).T]
+    along, square = (sum(a * b for a, b in zip(parts, toward, strict=True)) for parts in (away, toward))
+    share = np.asarray(along / np.maximum(square, 1))
+    inside = np.clip(share, 0, 1)
+    off = functools.reduce(np.maximum, (np.abs(a - inside * b) for a, b in zip(away, toward, strict=True)))
+    return share, off
