@@ -14,11 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import squares
-from warpsplat.drawing.constraints import Drawing, Flags, Floats, Links, summed, with_ends
+from warpsplat.drawing.constraints import Drawing, Flags, Floats, Links, rows_of, summed, with_ends
+from warpsplat.kernels.drawing import samples as kernels
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
+from warpsplat.rendering.program import launch_on_host
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import TILE, to_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, Scene
@@ -56,6 +58,10 @@ class Samples:
         """Return the samples ``index``, in that order."""
         return Samples(**{name: values[index] for name, values in vars(self).items()})
 
+    def starts(self, count: int) -> Links:
+        """Return where the samples of each of ``count`` cubics begin, and those of the last one end."""
+        return np.searchsorted(self.cubic, np.arange(count + 1))
+
 
 def bernstein(t: Floats) -> Floats:
     """Return the weights of a cubic's control points at ``t``, shape (sample, 4)."""
@@ -66,12 +72,6 @@ def bernstein(t: Floats) -> Floats:
 def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
     """Return which shapes have gradients, shape (shape,)."""
     return np.isin(scene.paint, GRADIENTS)
-
-
-def slopes_at(cubics: Floats, t: Floats) -> Floats:
-    """Return the derivatives by ``t`` of cubics, shape (sample, 4, 2), at ``t``, shape (sample,)."""
-    legs, s, u = 3 * np.diff(cubics, axis=1), (1 - t)[:, None], t[:, None]
-    return np.asarray(s * s * legs[:, 0] + 2 * s * u * legs[:, 1] + u * u * legs[:, 2])
 
 
 class Surroundings:
@@ -212,11 +212,11 @@ class Measure:
         contrast = self._contrast[(np.cumsum(self._counts) - self._counts)[cubic] + known]
         weight = np.repeat(contrast * 0.5 / counts[cubic], 2)
         cubics, cubic = with_ends(points, self._following), np.repeat(cubic, 2)
-        ahead = slopes_at(cubics[cubic], t)
-        speed = np.linalg.norm(ahead, axis=1)
-        normal = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.maximum(speed, 1e-9)[:, None]
-        where = (bernstein(t)[..., None] * cubics[cubic]).sum(axis=1)
-        return Samples(cubic, t, where, normal, weight * speed)
+        where, across = np.zeros((2, len(cubic), 2))
+        found = Samples(cubic, t, where, across, weight)
+        values = {"cubics": rows_of(cubics), "first": found.starts(len(counts)), "share": weight.copy()}
+        launch_on_host(kernels.along, len(counts), found, values)
+        return found
 
     def places(self, points: Floats) -> Samples:
         """Return samples at ``points``, those of the last ``error``, where the image has outlines."""

@@ -11,7 +11,7 @@ import numpy as np
 from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, summed
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
@@ -164,7 +164,7 @@ def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool)
     """
     drawing, least = fit.drawing, fit.least
     samples = fit.places()
-    errors = summed(samples.cubic, model.errors(samples, drawing.cubics()), len(drawing.joints) // 3)
+    errors = model.errors(samples, drawing.cubics())
     rest = fit.error - errors.sum()
     size = first = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
     refused = np.zeros((len(errors), 4), np.bool_)
