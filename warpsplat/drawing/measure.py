@@ -74,6 +74,12 @@ def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
     return np.isin(scene.paint, GRADIENTS)
 
 
+def different(numbers: Links) -> Links:
+    """Return the different ones among whole numbers, ascending: faster than by ``np.unique``."""
+    ordered = np.sort(numbers, axis=None)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
+
+
 class Surroundings:
     """The pixels around each cubic, and the tiles that have some."""
 
@@ -90,11 +96,11 @@ class Surroundings:
             [np.stack([x + i, y + j], axis=1) for i in (-MARGIN, MARGIN) for j in (-MARGIN, MARGIN)]
         )
         column, row = np.clip(corners.reshape(-1, 2), 0, limits - 1).T // TILE
-        self.tiles: Links = np.unique(row * viewport.tiles_x + column)
+        self.tiles: Links = different(row * viewport.tiles_x + column)
         wide, high = limits + 2
         x, y = np.clip(x + 1, 0, wide - 1), np.clip(y + 1, 0, high - 1)
-        middle = np.unique((which * high + y) * wide + x)
-        near = np.unique(middle[:, None] + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)]))
+        middle = different((which * high + y) * wide + x)
+        near = different(middle + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)])[:, None])
         x, y = near % wide - 1, near % (wide * high) // wide - 1
         inside = (x >= 0) & (x < viewport.width) & (y >= 0) & (y < viewport.height)
         near, x, y = near[inside], x[inside], y[inside]
