@@ -9,7 +9,7 @@ import pytest
 
 from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon
 from warpsplat.alpha import squares
-from warpsplat.drawing.constraints import Constraints, Drawing
+from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.model import errors, fitted
 from warpsplat.drawing.solve import Bending, newton_step
@@ -84,23 +84,35 @@ def test_the_normal_equations() -> None:
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
     samples, following = fit.places(), made.following()
     bending, points = Bending(samples, following), fit.points
-    gradient = bending.error_and_gradient(points)[1]
-    size = points.size
-    change = rng.normal(size=size)
-    h = 1e-4
-    ends = [bending.error_and_gradient(points + sign * h * change.reshape(-1, 2)) for sign in (1, -1)]
-    assert (ends[0][0].sum() - ends[1][0].sum()) / (2 * h) == pytest.approx(gradient @ change, rel=1e-5)
-    np.testing.assert_allclose((ends[0][1] - ends[1][1]) / (2 * h), bending.times(change), atol=1e-9)
+
+    def error_and_gradient(points: np.ndarray) -> tuple[float, np.ndarray]:
+        cubics = with_ends(points, following)
+        return float(errors(samples, cubics).sum()), bending.gradient(cubics)
+
+    gradient = error_and_gradient(points)[1]
+    change, h = rng.normal(size=points.size), 1e-4
+    ends = [error_and_gradient(points + sign * h * change.reshape(-1, 2)) for sign in (1, -1)]
+    assert (ends[0][0] - ends[1][0]) / (2 * h) == pytest.approx(gradient @ change, rel=1e-5)
     freedom = Constraints(made).freedom(points)
     damping, least = np.full(len(following), 0.1), 1e-7
-    step = newton_step(bending, freedom, gradient, damping, least)
+    found = newton_step(bending, freedom, gradient, damping, least)
+    # The gradient is linear in the points: its differences are the curvature.
+    flat = np.zeros_like(points)
+    steps = np.eye(points.size).reshape(-1, *points.shape)
+    full = np.stack([bending.gradient(with_ends(step, following)) for step in steps])
+    full -= bending.gradient(with_ends(flat, following))
+    own = np.zeros((len(following), 4))
+    t, weight = samples.t, 2 * damping[samples.cubic] * samples.weight
+    shares = np.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3], axis=1)
+    np.add.at(own, samples.cubic, weight[:, None] * shares**2)
+    stiff = own[:, :3].copy()
+    stiff[following, 0] += own[:, 3]
     wide = np.stack([freedom.times(row) for row in np.eye(freedom.size)], axis=1)
-    curvature = wide.T @ np.stack([bending.times(column) for column in wide.T], axis=1)
-    squared = np.bincount(
-        freedom.column, freedom.value**2 * bending.stiffness(damping)[freedom.row], freedom.size
-    )
-    want = np.linalg.solve(curvature + np.diag(squared + least), -freedom.adjoint(gradient))
-    assert np.linalg.norm(wide @ (step - want)) < 0.05 * np.linalg.norm(wide @ want)
+    squared = freedom.value**2 * np.repeat(stiff.ravel(), 2)[freedom.row]
+    added = np.bincount(freedom.column, squared, freedom.size)
+    matrix = wide.T @ full @ wide + np.diag(added + least)
+    want = np.linalg.solve(matrix, -freedom.adjoint(gradient))
+    assert np.linalg.norm(wide @ (found - want)) < 0.05 * np.linalg.norm(wide @ want)
 
 
 def test_outlines_follow_their_places() -> None:

@@ -67,7 +67,6 @@ def test_singular_values(matrix: np.ndarray) -> None:
     left, values, right = linear.svd(matrix)
     assert np.allclose(linear.product(left * values[..., None, :], right), matrix)
     assert np.allclose(values, np.linalg.svd(matrix, compute_uv=False))
-    assert np.allclose(linear.pinv(matrix, 1e-12), np.linalg.pinv(matrix, rcond=1e-12))
 
 
 def test_symmetric_matrices() -> None:
@@ -111,13 +110,12 @@ def test_pinned_bits() -> None:
         linear.solve_banded([9 + STACK[0, 0], STACK[0, 1, :3], STACK[0, 2, :2]], STACK[1]),
         linear.principal_direction(TALL[0, :, :2]),
         *linear.svd(TALL),
-        linear.pinv(TALL),
         *linear.eigh(STACK[:, :2, :2] + STACK[:, :2, :2].swapaxes(1, 2)),
         interp(STACK, np.arange(-4, 5), STACK.ravel()[:9]),
         convolve(STACK.ravel(), TALL[0, 0]),
     ]
     digest = hashlib.sha256(b"".join(np.asarray(each, "<f8").tobytes() for each in made)).hexdigest()
-    assert digest[:16] == "6af04b6dc479faa1"
+    assert digest[:16] == "618441c4d25e3a8f"
 
 
 def test_interp_takes_values_of_several_columns() -> None:

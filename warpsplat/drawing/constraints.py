@@ -96,6 +96,11 @@ def with_ends(points: Floats, following: Links) -> Floats:
     return np.concatenate([begun, begun[following, :1]], axis=1)
 
 
+def rows_of(cubics: Floats) -> Floats:
+    """Return the control points of cubics, shape (..., 4, 2), as kernels take them, shape (point, 2)."""
+    return np.ascontiguousarray(cubics, np.float64).reshape(-1, 2)
+
+
 def summed(index: Links, values: Floats, count: int) -> Floats:
     """Return the sums of ``values`` by ``index``, shape (count,)."""
     return np.bincount(index, values, count).astype(np.float64, copy=False)
@@ -115,6 +120,8 @@ class Constraints:
         points = scene.points.astype(np.float64).reshape(-1, 3, 2)
         count = len(points)
         self._next = drawing.following()
+        self._contour_first = scene.starts.astype(np.intp) // 3
+        self._sorted: tuple[Links, Links, Links, Links] | None = None
         self._previous = np.empty(count, np.intp)
         self._previous[self._next] = np.arange(count)
         self._is_line = drawing.lines()
@@ -265,19 +272,30 @@ class Constraints:
             turning = turn[:, None, None] * across[:, :, None] * across[:, None, :]
             add(h, 3 * end, turning)
             add(h, 3 * begin, -turning)
-        parts = [np.concatenate(part) for part in zip(*entries, strict=True)]
-        kept = ~(self._pinned[parts[1]] | self._held[parts[0] // 2])
-        return Freedom(parts[0][kept], parts[1][kept], parts[2][kept], 2 * len(points))
+        if not self._sorted:
+            rows, columns = (np.concatenate([entry[k] for entry in entries]) for k in (0, 1))
+            kept = np.flatnonzero(~(self._pinned[columns] | self._held[rows // 2]))
+            contour = np.searchsorted(self._contour_first, rows[kept] // 6, "right") - 1
+            order = kept[np.argsort(contour, kind="stable")]
+            ends = np.cumsum(np.bincount(contour, minlength=len(self._contour_first) - 1))
+            self._sorted = order, rows[order], columns[order], np.append(0, ends)
+        order, row, column, entry_first = self._sorted
+        value = np.concatenate([entry[2] for entry in entries])[order]
+        return Freedom(row, column, value, 2 * len(points), self._contour_first, entry_first)
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """A sparse matrix from free numbers to coordinates of points."""
+    """A sparse matrix from free numbers to coordinates of points, sorted by contour."""
 
     row: Links
     column: Links
     value: Floats
     size: int
+    contour_first: Links
+    """The cubics of each contour begin here, and end with the next, shape (contour + 1,)."""
+    entry_first: Links
+    """The entries, in the same way."""
 
     def times(self, numbers: Floats) -> Floats:
         """Return the change of the coordinates, shape (size,)."""

@@ -19,7 +19,7 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
 
-SECONDS_PER_NODE, SECONDS_PER_PIXEL = 1.3e-3, 2e-6
+SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5e-4, 2e-6
 """What the fit of a trace takes on one core, roughly [s]."""
 
 LONG = 10.0

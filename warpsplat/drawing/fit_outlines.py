@@ -156,7 +156,7 @@ class OutlineFit:
             gradient = self._measure.gradient(blurred=done <= far)
             if self._paints:
                 self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
-            if done % LOOKS == 0:
+            if done % LOOKS == 0 and done < steps:
                 self._measure.look()
             freedom = self._constraints.freedom(at)
             bending = Bending(self._measure.samples(at), self._following)

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, summed, with_ends
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, rows_of, with_ends
 from warpsplat.drawing.measure import Samples
 from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits
 from warpsplat.drawing.solve import Bending, newton_step
-from warpsplat.scene.scene import ranges
+from warpsplat.kernels.drawing import samples as kernels
+from warpsplat.rendering.program import launch_on_host
 
 STEPS, PLACING_ROUNDS = 2, 2
 """Steps of a fit, and of finding where on its piece a sample lies before each."""
@@ -19,22 +20,11 @@ DAMPING = 0.01
 """Added curvature, as a share."""
 
 
-def polynomials(cubics: Floats, chosen: Links) -> Floats:
-    """Return the coefficients of the ``chosen`` cubics, lowest first, shape (4, 2, chosen)."""
-    a, b, c, d = cubics.transpose(1, 2, 0)
-    return np.stack([a, 3 * (b - a), 3 * (c - 2 * b + a), d - 3 * c + 3 * b - a])[..., chosen]
-
-
 def placed(samples: Samples, cubics: Floats, rounds: int = PLACING_ROUNDS) -> Samples:
     """Return samples at the places of ``cubics``, shape (cubic, 4, 2), that are nearest to theirs."""
-    t, (a, b, c, d) = samples.t, polynomials(cubics, samples.cubic)
-    a = a - samples.place.T
-    for _ in range(rounds):
-        away = ((d * t + c) * t + b) * t + a
-        speed, bend = (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
-        first, curvature = away[0] * speed[0] + away[1] * speed[1], away[0] * bend[0] + away[1] * bend[1]
-        second = speed[0] * speed[0] + speed[1] * speed[1] + np.maximum(curvature, 0)
-        t = np.clip(t - first / np.maximum(second, 1e-12), 0, 1)
+    t, count = samples.t.copy(), len(cubics)
+    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "rounds": rounds}
+    launch_on_host(kernels.nearest, count, samples, values, t=t)
     return replace(samples, t=t)
 
 
@@ -65,24 +55,26 @@ def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
     rows = np.flatnonzero(kind == TANGENT)
     value = cubic[rows, 1, 0, edits.axis[rows]]
     cubic[rows, 0, 2, edits.axis[rows]] = cubic[rows, 1, 1, edits.axis[rows]] = value
-    growth = np.zeros(len(kind))
-    bounds = np.searchsorted(samples.cubic, np.arange(count + 1))
-    old = summed(samples.cubic, errors(samples, cubics), count)
-    first_length, second_length = (chords(cubics[rows]) for rows in (before, edits.at))
-    share = first_length / np.maximum(first_length + second_length, 1e-9)
-    for k, rows in enumerate((before, edits.at, after)):
-        counts = bounds[rows + 1] - bounds[rows]
-        number = ranges(bounds[rows], counts)
-        which = np.repeat(np.arange(len(kind)), counts)
-        part = samples.take(number)
-        t = part.t
-        if k < 2:
-            joined = (kind == WITHOUT)[which]
-            inside = t * share[which] if k == 0 else share[which] + t * (1 - share[which])
-            t = np.where(joined, inside, t)
-        part = placed(replace(part, cubic=which, t=t), cubic[:, k])
-        growth += summed(which, errors(part, cubic[:, k]), len(kind)) - old[rows]
-    return growth
+    lengths = [chords(cubics[rows]) for rows in (before, edits.at)]
+    share = lengths[0] / np.maximum(lengths[0] + lengths[1], 1e-9)
+    low, high = np.zeros((len(kind), 3)), np.ones((len(kind), 3))
+    joined = kind == WITHOUT
+    high[joined, 0] = low[joined, 1] = share[joined]
+    instead = np.stack([before, edits.at, after], axis=1)
+    found = np.zeros(3 * len(kind))
+    launch_on_host(
+        kernels.errors_elsewhere,
+        len(found),
+        samples,
+        cubics=rows_of(cubic),
+        instead=instead.ravel(),
+        low=low.ravel(),
+        high=high.ravel(),
+        first=samples.starts(count),
+        rounds=PLACING_ROUNDS,
+        error=found,
+    )
+    return np.asarray((found.reshape(-1, 3) - errors(samples, cubics)[instead]).sum(axis=1))
 
 
 def chords(cubics: Floats) -> Floats:
@@ -91,10 +83,11 @@ def chords(cubics: Floats) -> Floats:
 
 
 def errors(samples: Samples, cubics: Floats) -> Floats:
-    """Return the errors of the samples on ``cubics``."""
-    t, (a, b, c, d) = samples.t, polynomials(cubics, samples.cubic)
-    x, y = (((d * t + c) * t + b) * t + a - samples.place.T) * samples.across.T
-    return np.asarray(samples.weight * (x + y) ** 2)
+    """Return the errors of the samples on ``cubics``, shape (cubic,)."""
+    count, found = len(cubics), np.zeros(len(cubics))
+    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "error": found}
+    launch_on_host(kernels.errors, count, samples, values)
+    return found
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
@@ -129,7 +122,7 @@ def fitted(
     points, t = drawing.scene.points.copy(), samples.t.copy()
     points[np.repeat(inside, 3)], t[own] = made, part.t
     samples, fit = replace(samples, t=t), replace(drawing, scene=replace(drawing.scene, points=points))
-    return fit, samples, summed(samples.cubic, errors(samples, fit.cubics()), len(inside))
+    return fit, samples, errors(samples, fit.cubics())
 
 
 def _fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Floats, Samples]:
@@ -140,7 +133,7 @@ def _fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Floats, S
     damping = np.full(len(following), DAMPING)
     for _ in range(STEPS):
         bending, freedom = Bending(samples, following), constraints.freedom(points)
-        gradient = bending.error_and_gradient(points)[1]
+        gradient = bending.gradient(with_ends(points, following))
         change = np.clip(newton_step(bending, freedom, gradient, damping, least), -1, 1)
         points = constraints.project(points + freedom.times(change).reshape(-1, 2))
         samples = placed(samples, with_ends(points, following))

@@ -15,7 +15,7 @@ from warpsplat.svg.primitives import Primitive
 
 Floats = npt.NDArray[np.float64]
 
-ROUNDS = 12  # of Gauss and Newton's method
+ROUNDS, ROUGH_ROUNDS = 12, 4  # of Gauss and Newton's method, and those that tell what is far from any shape
 STEP = 1e-4  # [px] of numeric derivatives
 DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
 TOGETHER = 64  # outlines that are handled at once: their arrays stay in the processor's cache
@@ -33,6 +33,10 @@ class Samples(NamedTuple):
     """Shape (outline, sample, 2) [px]."""
     weights: Floats
     """By which squared distances count: what a distance costs in the image, shape (outline, sample)."""
+
+    def take(self, rows: npt.NDArray[np.intp]) -> Samples:
+        """Return those of some outlines."""
+        return Samples(self.points[rows], self.weights[rows])
 
 
 @dataclass(frozen=True)
@@ -105,30 +109,35 @@ class Fits(NamedTuple):
     """Distances of the samples, shape (outline, sample) [px]."""
 
 
-def nearest(family: Family, samples: Samples) -> Fits:
+def nearest(family: Family, samples: Samples, begun: Floats | None = None, rounds: int = ROUNDS) -> Fits:
     """Return the shapes of a family nearest to most of the samples, by weighted least squares.
 
     Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
+
+    ``begun``: values after ``ROUGH_ROUNDS``, shape (outline, value); without, those of the samples' boxes.
     """
-    parts = [
-        _nearest(family, Samples(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER]))
-        for i in range(0, len(samples.points), TOGETHER)
-    ]
+    parts = []
+    for i in range(0, len(samples.points), TOGETHER):
+        part = Samples(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
+        if begun is None:
+            parts.append(_nearest(family, part, _start(family, part), range(rounds)))
+        else:
+            parts.append(_nearest(family, part, begun[i : i + TOGETHER], range(ROUGH_ROUNDS, rounds)))
     return Fits(*(np.concatenate(own) for own in zip(*parts, strict=True)))
 
 
-def _nearest(family: Family, samples: Samples) -> Fits:
-    """Return the nearest shapes of a family, as ``nearest``."""
+def _nearest(family: Family, samples: Samples, values: Floats, rounds: range) -> Fits:
+    """Return the nearest shapes of a family from ``values`` on, as ``nearest``."""
     points, weights = samples
-    values = _start(family, samples)
-    reach = FIRST_REACH * values[:, 2:].max(axis=1)
+    size = _start(family, samples)[:, 2:].max(axis=1)
     unit = np.eye(values.shape[1])
 
     def off(values: Floats) -> Floats:
         half, radii = family.boxes(values[:, 2:])
         return distances(points - values[:, None, :2], half, radii)
 
-    for _ in range(ROUNDS):
+    for number in rounds:
+        reach = np.maximum(FIRST_REACH * size / 2**number, LAST_REACH if number else 0)
         here = off(values)
         slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit], axis=2)
         trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2
@@ -138,7 +147,6 @@ def _nearest(family: Family, samples: Samples) -> Fits:
         damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
         values = values - solve(damped, (weighted * here[..., None]).sum(axis=1)[..., None])[..., 0]
         values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
-        reach = np.maximum(reach / 2, LAST_REACH)
     return Fits(values, stiffness, off(values))
 
 

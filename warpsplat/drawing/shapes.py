@@ -13,7 +13,16 @@ import numpy.typing as npt
 
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
 from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, summed
-from warpsplat.drawing.primitive_fits import FAMILIES, TOGETHER, Family, Fits, Samples, nearest, shape_of
+from warpsplat.drawing.primitive_fits import (
+    FAMILIES,
+    ROUGH_ROUNDS,
+    TOGETHER,
+    Family,
+    Fits,
+    Samples,
+    nearest,
+    shape_of,
+)
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
@@ -31,6 +40,9 @@ MOST_PIECES = 24
 
 SAMPLES = 96
 """Points by which an outline is compared with a shape."""
+
+FEWER, ROUGHLY = 4, 1.5
+"""One in how many of these tells outlines that are far from any shape, and how much farther those are."""
 
 MOST_OFF = 0.6
 """Largest distance of an outline from its basic shape [px]."""
@@ -124,7 +136,7 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
     if not len(contours):
         return []
     samples, is_likely = _samples(target, _points_along(scene, contours))
-    samples = Samples(samples.points[is_likely], samples.weights[is_likely])
+    samples = samples.take(np.flatnonzero(is_likely))
     contours = contours[is_likely]
     if not len(contours):
         return []
@@ -136,8 +148,11 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
         rows = np.flatnonzero(least >= worth * family.size)
         if not len(rows):
             break
-        own = Samples(samples.points[rows], samples.weights[rows])
-        fits = nearest(family, own)
+        rows, begun = _likely(family, rows, samples, worth * (sizes - family.size))
+        if not len(rows):
+            continue
+        own = samples.take(rows)
+        fits = nearest(family, own, begun)
         costs = _costs(family, fits, own, areas[rows], worth)
         for k in np.flatnonzero(costs < least[rows]).tolist():
             i = int(rows[k])
@@ -148,6 +163,22 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
             )
         least[rows] = np.minimum(least[rows], costs)
     return [found[i] for i in sorted(found)]
+
+
+def _likely(family: Family, rows: IndexArray, samples: Samples, most: Floats) -> tuple[IndexArray, Floats]:
+    """Return which of the outlines ``rows`` may become shapes of a family, and the values that these have.
+
+    Few samples and rounds tell. ``most``: the errors that the bytes saved are worth, by outline.
+    """
+    few = Samples(samples.points[rows, ::FEWER], samples.weights[rows, ::FEWER])
+    fits = nearest(family, few, rounds=ROUGH_ROUNDS)
+    off = np.abs(fits.off)
+    cost = FEWER * (few.weights * np.minimum(off, MOST_OFF) ** 2).sum(axis=1)
+    near = ((few.weights > 0) & (off <= ROUGHLY * MOST_OFF)).sum(axis=1) * ROUGHLY >= LEAST_SEEN * off.shape[
+        1
+    ]
+    likely = near & (cost <= ROUGHLY**2 * most[rows])
+    return rows[likely], fits.values[likely]
 
 
 def cubics_of(scene: Scene, contour: int) -> Floats:

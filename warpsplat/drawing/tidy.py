@@ -11,7 +11,7 @@ import numpy as np
 from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, summed
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import Outlines, apart, applied
@@ -24,7 +24,8 @@ from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.primitives import held_rounds
-from warpsplat.svg.write import GRIDS, rounded, write_svg
+from warpsplat.svg.sizes import estimated_size
+from warpsplat.svg.write import GRIDS, rounded
 
 ROUNDS = 16
 """Most rounds in which edits are tried."""
@@ -147,7 +148,7 @@ def with_exact_shapes(
         return fit.drawing
 
     errors = errors_of(drawing)
-    size = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
+    size = estimated_size(drawing.scene, DRAFT_GRID)
     worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
     exact = with_shapes(target, drawing, errors_of, errors, worth)
     if not symbols:
@@ -164,9 +165,9 @@ def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool)
     """
     drawing, least = fit.drawing, fit.least
     samples = fit.places()
-    errors = summed(samples.cubic, model.errors(samples, drawing.cubics()), len(drawing.joints) // 3)
+    errors = model.errors(samples, drawing.cubics())
     rest = fit.error - errors.sum()
-    size = first = len(write_svg(drawing.scene, per_pixel=DRAFT_GRID))
+    size = first = estimated_size(drawing.scene, DRAFT_GRID)
     refused = np.zeros((len(errors), 4), np.bool_)
     for _ in range(ROUNDS):
         edits = Outlines(drawing).edits(refused)
@@ -212,7 +213,7 @@ def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    sizes = [len(write_svg(scene, per_pixel=grid)) for grid in MEASURED_GRIDS]
+    sizes = [estimated_size(scene, grid) for grid in MEASURED_GRIDS]
     digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
     worth = price * byte_worth(max(fit.error, LEAST_ERROR), sizes[1])
     costs = {}

@@ -158,17 +158,6 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
     return left, values, np.swapaxes(np.take_along_axis(rotation, order[..., None, :], axis=-1), -2, -1)
 
 
-def pinv(matrix: Matrices, tolerance: float = 1e-15) -> Result:
-    """Return the pseudo-inverses (..., n, m) of matrices (..., m, n).
-
-    Singular values of at most ``tolerance`` times the largest count as 0.
-    """
-    left, values, right = svd(matrix)
-    kept = values > tolerance * values[..., :1]
-    inverted = np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
-    return product(np.swapaxes(right, -2, -1) * inverted[..., None, :], np.swapaxes(left, -2, -1))
-
-
 def solve_banded(diagonals: Sequence[Matrices], right: Matrices) -> Result:
     """Return ``x`` of ``matrix @ x = right`` for a symmetric positive definite matrix with few diagonals.
 

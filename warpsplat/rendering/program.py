@@ -147,6 +147,16 @@ class Program:
         return seconds
 
 
+def launch_on_host(kernel: wp.Kernel, count: int, *sources: object, **values: Any) -> None:
+    """Run ``count`` threads of a kernel on NumPy arrays, on the CPU; what it writes are whole arrays.
+
+    ``sources`` and ``values`` as of ``Program.launch``.
+    """
+    program = Program(wp.get_device("cpu"))
+    program.launch(kernel, count, *sources, **values)
+    program.run()
+
+
 def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
     """Capture a graph that replays ``programs`` without Python in between; None where that is not possible.
 
