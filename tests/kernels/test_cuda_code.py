@@ -10,10 +10,11 @@ import pytest
 import warp as wp
 
 from tests.kernels.modules import all_kernels
+from warpsplat.kernels.tile import quad
 
 ARCHITECTURE = 75
 
-MODULES = {kernel.module.name: kernel.module for kernel in all_kernels()}
+MODULES = {kernel.module.name: kernel.module for kernel in all_kernels(quad)}
 
 
 def cuda_code(module: wp.Module, scratch: Path) -> str:
@@ -36,6 +37,6 @@ def cuda_code(module: wp.Module, scratch: Path) -> str:
 @pytest.mark.parametrize("name", MODULES)
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     text = cuda_code(MODULES[name], tmp_path)
-    for kernel in all_kernels():
+    for kernel in all_kernels(quad):
         if kernel.module.name == name:
             assert f".entry {kernel.key}_" in text
