@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import argparse
 import functools
-import importlib.util
+import importlib.metadata
 import os
 import re
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -80,7 +79,7 @@ def ptx_of(module: wp.Module) -> Path:
         with tempfile.TemporaryDirectory() as scratch:
             wp.compile_aot_module(module, arch=ARCHITECTURES[0], module_dir=scratch, use_ptx=True)
             (made,) = Path(scratch).glob("*.ptx")
-            text = re.sub(r"(?m)^\.version .*$", f".version {PTX_VERSION}", made.read_text())
+            text = re.sub(r"(?m)^\.version .*$", f".version {PTX_VERSION}", made.read_text().rstrip("\0"))
         write_whole(kept, text)
     return kept
 
@@ -94,21 +93,20 @@ def write_whole(path: Path, text: str) -> None:
 
 
 @functools.cache
-def assembler() -> str | None:
-    """Return the path of ptxas: of the package, or of a CUDA toolkit; None without one."""
-    found = importlib.util.find_spec("nvidia")
-    for folder in (found.submodule_search_locations or []) if found else []:
-        path = Path(folder) / "cuda_nvcc" / "bin" / "ptxas"
-        if path.exists():
-            return str(path)
-    return shutil.which("ptxas")
+def assembler() -> tuple[str, str] | None:
+    """Return the path of ptxas and its version; None where the package is not installed."""
+    try:
+        package = importlib.metadata.distribution("nvidia-cuda-nvcc-cu12")
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    return str(package.locate_file("nvidia/cuda_nvcc/bin/ptxas")), package.version
 
 
 def assemble(ptx: Path, architecture: int, *options: str) -> str:
     """Return what ptxas reports of a module."""
-    tool = assembler()
-    assert tool, "no ptxas"
-    command = [tool, "-v", f"-arch=sm_{architecture}", *options, str(ptx), "-o", os.devnull]
+    found = assembler()
+    assert found, "no ptxas"
+    command = [found[0], "-v", f"-arch=sm_{architecture}", *options, str(ptx), "-o", os.devnull]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stderr
@@ -138,11 +136,12 @@ def usages_of(modules: Iterable[wp.Module]) -> dict[int, dict[str, Usage]]:
 
     def report(work: tuple[Path, int]) -> str:
         ptx, architecture = work
-        kept = ptx.with_suffix(f".sm{architecture}.txt")
+        kept = ptx.with_suffix(f".{version}.sm{architecture}.txt")
         if not kept.exists():
             write_whole(kept, assemble(ptx, architecture))
         return kept.read_text()
 
+    version = (assembler() or ("", ""))[1]
     works = [(ptx, architecture) for ptx in map(ptx_of, modules) for architecture in ARCHITECTURES]
     found: dict[int, dict[str, Usage]] = {architecture: {} for architecture in ARCHITECTURES}
     with ThreadPoolExecutor() as pool:
