@@ -43,6 +43,26 @@ def paint_against(paint: wp.vec4, red: Any, green: Any, blue: Any):
     return paint[0] * red + paint[1] * green + paint[2] * blue
 
 
+@wp.kernel
+def sum_lanes(
+    # In:
+    offset: wp.int32,
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    # Out:
+    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the sum of all in the first one's place
+):
+    """Sum the gradients of visible slots over the lanes of a GPU. One thread a slot: shapes have so many that
+    a thread a shape would be long.
+    """
+    slot = offset + wp.tid()
+    state = slot_state[slot]
+    if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+        sums = slot_grad[slot, 0]
+        for lane in range(1, slot_grad.shape[1]):
+            sums = sums + slot_grad[slot, lane]
+        slot_grad[slot, 0] = sums
+
+
 @functools.cache
 def make_backward(column: Any) -> wp.Kernel:
     """Return the adjoint of flat paints, for vectors of type ``column``."""
@@ -57,7 +77,7 @@ def make_backward(column: Any) -> wp.Kernel:
         slot_last: wp.array[wp.int32],  # [shape_count]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         slot_columns: wp.array2d[column],  # [slot_capacity, 4]
-        slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
+        slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] see sum_lanes
         # Out:
         colors_grad: wp.array[wp.vec3],  # [shape_count] written
         opacities_grad: wp.array[wp.float32],  # [shape_count] written
@@ -80,8 +100,7 @@ def make_backward(column: Any) -> wp.Kernel:
                     blue = blue + slot_columns[slot, 2]
                     opacity = opacity + slot_columns[slot, 3]
                 else:
-                    for lane in range(lanes):
-                        sums = sums + slot_grad[slot, lane]
+                    sums = sums + slot_grad[slot, 0]
         if paint[shape] != constants.FLAT:
             red = column(0.0)
             green = column(0.0)

@@ -94,6 +94,8 @@ class Painting:
             for case in gradient_kernels.NAMES:
                 kernel = gradient_kernels.make_backward(column, case)
                 program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
+        if self._backend.lanes > 1:
+            program.launch(flat.sum_lanes, self._slots, *self._sources, split=True)
         kernel = flat.make_backward(column)
         program.launch(kernel, shapes, *self._sources, lanes=self._backend.lanes, split=True)
 
