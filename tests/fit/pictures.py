@@ -36,10 +36,11 @@ def step_for(
     *,
     threads: int | None = None,
     base: int = 0,
+    weights: FloatArray | None = None,
     capacity: Capacity | None = None,
 ) -> Step:
     """Return the first step of a fit of ``scene`` at the finest size."""
     settings = settings or make_settings()
     state = FitState.start(scene, Backend.on(device, threads), np.random.default_rng(0), base=base)
-    target = Target(image, phases(settings, image.shape[1], image.shape[0])[-1])
+    target = Target(image, phases(settings, image.shape[1], image.shape[0])[-1], weights)
     return Step(state, settings, target, capacity=capacity)
