@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
 import pytest
 import warp as wp
 
+from tests.kernels import racing
 from tests.kernels.modules import all_kernels
 
 ARCHITECTURE = 75
+
+ATOMIC_FLOATS = re.compile(r"\b(atom|red)\.\S*\.b?f(16|32|64)")
 
 MODULES = {kernel.module.name: kernel.module for kernel in all_kernels()}
 
@@ -39,3 +43,9 @@ def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     for kernel in all_kernels():
         if kernel.module.name == name:
             assert f".entry {kernel.key}_" in text
+    assert not ATOMIC_FLOATS.search(text), "results would depend on the order of threads"
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="Warp for macOS has no CUDA compiler")
+def test_atomic_sums_of_floats_are_found(tmp_path: Path) -> None:
+    assert ATOMIC_FLOATS.search(cuda_code(racing.adds_up.module, tmp_path))
