@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -226,6 +225,21 @@ def _entry_of(handle: str) -> Any:
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
 
 
+def _library_count(stage: str, function: Any, arguments: tuple[Any, ...]) -> Count:
+    """Return what a scan or a sort does on a GPU, where both are CUB's: a pass over the numbers; a pass for the
+    digits' histograms, and one for each digit of 8 bits.
+    """
+    if function is wp.utils.array_scan:
+        size = 4 * arguments[0].shape[0]
+        memory = Memory(size, size, size, size)
+    else:
+        assert function is wp.utils.radix_sort_pairs
+        size, passes = 4 * arguments[2], -(-arguments[4] // 8)
+        read, written = (2 * passes + 1) * size, 2 * passes * size
+        memory = Memory(read, written, read, written)
+    return Count(stage, function.__name__, size // 4, {"": memory}, 0, 0, 0)
+
+
 @contextlib.contextmanager
 def tracing(tracer: Tracer) -> Iterator[Tracer]:
     """Trace all launches that are recorded within the block, also where they are replayed after it.
@@ -233,7 +247,7 @@ def tracing(tracer: Tracer) -> Iterator[Tracer]:
     Steps made for two threads are not captured as graphs; their launches are not split here.
     """
     before: dict[wp.Module, dict[str, Any]] = {}
-    original = Program.launch
+    original, original_call = Program.launch, Program.call
 
     def launch(self: Program, kernel: wp.Kernel, dim: Any, *sources: object, **values: Any) -> None:
         _compile_traced(kernel.module, before)
@@ -243,11 +257,21 @@ def tracing(tracer: Tracer) -> Iterator[Tracer]:
             stage, (command, _) = self.stage, self._commands[-1]
             self.launches[-1] = Launch(stage, kernel.key, (lambda: tracer.run(stage, command),))
 
-    programs.Program.launch = launch  # type: ignore[method-assign]
+    def call(self: Program, function: Any, *arguments: Any) -> None:
+        count = _library_count(self.stage, function, arguments)
+
+        def run() -> None:
+            tracer.counts.append(count)
+            function(*arguments)
+
+        self.launches.append(Launch(self.stage, function.__name__, (run,)))
+
+    programs.Program.launch, programs.Program.call = launch, call  # type: ignore[method-assign]
     try:
         yield tracer
     finally:
         programs.Program.launch = original  # type: ignore[method-assign]
+        programs.Program.call = original_call  # type: ignore[method-assign]
         for module, options in before.items():
             module.options.clear()
             module.options.update(options)
@@ -260,13 +284,3 @@ def _compile_traced(module: wp.Module, before: dict[wp.Module, dict[str, Any]]) 
         before[module] = dict(module.options)
         module.options.update(TRACED)
         module.mark_modified()
-
-
-def totals(counts: list[Count]) -> dict[str, list[Count]]:
-    """Return the launches by kernel, in the order of their first ones."""
-    ordered = sorted(enumerate(counts), key=lambda pair: (pair[1].kernel, pair[0]))
-    groups = {
-        key: [count for _, count in group]
-        for key, group in itertools.groupby(ordered, key=lambda p: p[1].kernel)
-    }
-    return {count.kernel: groups[count.kernel] for count in counts}
