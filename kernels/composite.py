@@ -15,12 +15,13 @@ made for each slot, cost a tenth of the time.
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint.flat import paint_times
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -29,10 +30,11 @@ TINY = wp.constant(1.0e-9)
 
 
 @functools.cache
-def make_forward(*, painted: bool, straight: bool = False) -> wp.Kernel:
+def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Kernel:
     """Return a kernel that composites each tile's list.
 
     Args:
+        column: type of its vectors of pixels.
         painted: whether there may be gradients and pictures, or a transparent canvas.
         straight: whether the colours are to be straight, not premultiplied, as in DiffVG: the mean over the
             pixel's area of the colours, black where nothing is. That is colour / opacity x hit; hit, the part
@@ -40,6 +42,7 @@ def make_forward(*, painted: bool, straight: bool = False) -> wp.Kernel:
             underestimates where shapes meet.
     """
     skips_cached = not straight
+    painted = painted or straight
     name = "straight_forward" if straight else "paint_forward" if painted else "composite_forward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
@@ -52,12 +55,14 @@ def make_forward(*, painted: bool, straight: bool = False) -> wp.Kernel:
         tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
-        coverage: wp.array2d[column],  # [slot_capacity, TILE]
-        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity of each pixel
+        coverage: wp.array2d[column],  # [slot_capacity, columns]
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] colour and opacity of each pixel
         background: wp.vec3,
         # Out:
-        image: wp.array3d[column],  # [tile_count, planes, TILE] colour, and opacity of a transparent canvas
-        hit: wp.array2d[column],  # [tile_count, TILE] part of a pixel that shapes lie on; straight only
+        image: wp.array3d[
+            column
+        ],  # [tile_count, planes, columns] colour, and opacity of a transparent canvas
+        hit: wp.array2d[column],  # [tile_count, columns] part of a pixel that shapes lie on; straight only
     ):
         """One thread a tile and lane. Cached tiles stay as they are."""
         i, lane = wp.tid()
@@ -124,117 +129,129 @@ def make_forward(*, painted: bool, straight: bool = False) -> wp.Kernel:
     return forward
 
 
-@wp.kernel
-def removal_cost(
-    # In:
-    offset: wp.int32,
-    lane_columns: wp.int32,
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_stop: wp.array[wp.int32],  # [tile_count]
-    list_slot: wp.array[wp.int32],  # [slot_capacity]
-    list_paint: wp.array[wp.vec4],  # [slot_capacity]
-    coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE]
-    image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass
-    target: wp.array3d[column],  # [tile_count, planes, TILE]
-    importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
-    # Out:
-    slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
-):
-    """Compute by how much the weighted squared error would grow if one shape were removed.
+@functools.cache
+def make_removal_cost(column: Any) -> wp.Kernel:
+    """Return a kernel that computes what removing a shape costs, for vectors of type ``column``."""
 
-    Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and its
-    squared error by 2 d . (image - target) + d . d. On a transparent canvas the error is the mean of those on
-    black and on white, where what is not covered is white.
-    """
-    i, lane = wp.tid()
-    tile = offset + i
-    one = column(1.0)
-    zero = column(0.0)
-    planes = image.shape[1]
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        transmittance = one
-        red = image[tile, 0, x]
-        green = image[tile, 1, x]
-        blue = image[tile, 2, x]
-        opaque = one
-        red_error = 2.0 * (red - target[tile, 0, x])
-        green_error = 2.0 * (green - target[tile, 1, x])
-        blue_error = 2.0 * (blue - target[tile, 2, x])
-        opaque_error = zero
-        if planes == 4:
-            opaque = image[tile, 3, x]
-            opaque_error = 2.0 * (opaque - target[tile, 3, x])
-        for k in range(tile_first[tile], tile_stop[tile]):
-            paint = list_paint[k]
-            slot = list_slot[k]
-            seen = wp.abs(paint[3]) * transmittance
-            if slot >= 0:
-                seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
-            else:
-                slot = -1 - slot
-            if paint[3] < 0.0:
-                seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
-            lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
-            transmittance = transmittance - seen
-            red_seen = paint_times(paint, 0, seen)
-            green_seen = paint_times(paint, 1, seen)
-            blue_seen = paint_times(paint, 2, seen)
-            if paint[3] < 0.0:
-                red_seen = wp.cw_mul(seen, paint_columns[slot, 0, x])
-                green_seen = wp.cw_mul(seen, paint_columns[slot, 1, x])
-                blue_seen = wp.cw_mul(seen, paint_columns[slot, 2, x])
-            red = red - red_seen
-            green = green - green_seen
-            blue = blue - blue_seen
-            share = wp.cw_div(seen, wp.max(transmittance, TINY * one))
-            red_seen = wp.cw_mul(share, red) - red_seen
-            green_seen = wp.cw_mul(share, green) - green_seen
-            blue_seen = wp.cw_mul(share, blue) - blue_seen
-            cost = wp.cw_mul(red_seen, red_seen + red_error)
-            cost = cost + wp.cw_mul(green_seen, green_seen + green_error)
-            cost = cost + wp.cw_mul(blue_seen, blue_seen + blue_error)
+    @wp.kernel(name="removal_cost", module="unique", module_options=constants.MODULE_OPTIONS)
+    def removal_cost(
+        # In:
+        offset: wp.int32,
+        lane_columns: wp.int32,
+        tile_first: wp.array[wp.int32],  # [tile_count]
+        tile_stop: wp.array[wp.int32],  # [tile_count]
+        list_slot: wp.array[wp.int32],  # [slot_capacity]
+        list_paint: wp.array[wp.vec4],  # [slot_capacity]
+        coverage: wp.array2d[column],  # [slot_capacity, columns]
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns]
+        image: wp.array3d[column],  # [tile_count, planes, columns] of the forward pass
+        target: wp.array3d[column],  # [tile_count, planes, columns]
+        importance: wp.array2d[column],  # [tile_count, columns] weight of a pixel, 0 outside of the image
+        # Out:
+        slot_cost: wp.array2d[wp.float32],  # [slot_capacity, lanes] sum over pixels and channels; others kept
+    ):
+        """Compute by how much the weighted squared error would grow if one shape were removed.
+
+        Behind a shape lies the colour b = rest / T; without it a pixel changes by d = T alpha (b - c), and
+        its squared error by 2 d . (image - target) + d . d. On a transparent canvas the error is the mean of
+        those on black and on white, where what is not covered is white.
+        """
+        i, lane = wp.tid()
+        tile = offset + i
+        one = column(1.0)
+        zero = column(0.0)
+        planes = image.shape[1]
+        for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+            transmittance = one
+            red = image[tile, 0, x]
+            green = image[tile, 1, x]
+            blue = image[tile, 2, x]
+            opaque = one
+            red_error = 2.0 * (red - target[tile, 0, x])
+            green_error = 2.0 * (green - target[tile, 1, x])
+            blue_error = 2.0 * (blue - target[tile, 2, x])
+            opaque_error = zero
             if planes == 4:
-                opaque = opaque - seen
-                d = wp.cw_mul(share, opaque) - seen
-                cost = 0.5 * cost
-                cost = cost + 0.5 * wp.cw_mul(red_seen - d, red_seen - d + red_error - opaque_error)
-                cost = cost + 0.5 * wp.cw_mul(green_seen - d, green_seen - d + green_error - opaque_error)
-                cost = cost + 0.5 * wp.cw_mul(blue_seen - d, blue_seen - d + blue_error - opaque_error)
-            cost = wp.cw_mul(cost, wp.cw_mul(lit, importance[tile, x]))
-            slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)
+                opaque = image[tile, 3, x]
+                opaque_error = 2.0 * (opaque - target[tile, 3, x])
+            for k in range(tile_first[tile], tile_stop[tile]):
+                paint = list_paint[k]
+                slot = list_slot[k]
+                seen = wp.abs(paint[3]) * transmittance
+                if slot >= 0:
+                    seen = wp.cw_mul(seen, wp.abs(coverage[slot, x]))
+                else:
+                    slot = -1 - slot
+                if paint[3] < 0.0:
+                    seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
+                lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
+                transmittance = transmittance - seen
+                red_seen = paint_times(paint, 0, seen)
+                green_seen = paint_times(paint, 1, seen)
+                blue_seen = paint_times(paint, 2, seen)
+                if paint[3] < 0.0:
+                    red_seen = wp.cw_mul(seen, paint_columns[slot, 0, x])
+                    green_seen = wp.cw_mul(seen, paint_columns[slot, 1, x])
+                    blue_seen = wp.cw_mul(seen, paint_columns[slot, 2, x])
+                red = red - red_seen
+                green = green - green_seen
+                blue = blue - blue_seen
+                share = wp.cw_div(seen, wp.max(transmittance, TINY * one))
+                red_seen = wp.cw_mul(share, red) - red_seen
+                green_seen = wp.cw_mul(share, green) - green_seen
+                blue_seen = wp.cw_mul(share, blue) - blue_seen
+                cost = wp.cw_mul(red_seen, red_seen + red_error)
+                cost = cost + wp.cw_mul(green_seen, green_seen + green_error)
+                cost = cost + wp.cw_mul(blue_seen, blue_seen + blue_error)
+                if planes == 4:
+                    opaque = opaque - seen
+                    d = wp.cw_mul(share, opaque) - seen
+                    cost = 0.5 * cost
+                    cost = cost + 0.5 * wp.cw_mul(red_seen - d, red_seen - d + red_error - opaque_error)
+                    cost = cost + 0.5 * wp.cw_mul(green_seen - d, green_seen - d + green_error - opaque_error)
+                    cost = cost + 0.5 * wp.cw_mul(blue_seen - d, blue_seen - d + blue_error - opaque_error)
+                cost = wp.cw_mul(cost, wp.cw_mul(lit, importance[tile, x]))
+                slot_cost[slot, lane] = slot_cost[slot, lane] + total(cost)
+
+    return removal_cost
 
 
-@wp.kernel
-def visibility(
-    # In:
-    offset: wp.int32,
-    lane_columns: wp.int32,  # columns of a tile that a thread handles
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_stop: wp.array[wp.int32],  # [tile_count]
-    list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
-    list_paint: wp.array[wp.vec4],  # [slot_capacity] opacity last, negative of gradients
-    coverage: wp.array2d[column],  # [slot_capacity, TILE]
-    paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] of gradients: opacity last
-    # Out:
-    seen: wp.array2d[column],  # [slot_capacity, TILE] written for slots on the lists; others kept
-):
-    """Compute opacity x coverage x transmittance pixel by pixel: the image changes by seen x d where a
-    shape's colour changes by d. One thread a tile and lane.
-    """
-    i, lane = wp.tid()
-    tile = offset + i
-    for x in range(lane * lane_columns, (lane + 1) * lane_columns):
-        transmittance = column(1.0)
-        for k in range(tile_first[tile], tile_stop[tile]):
-            opacity = list_paint[k][3]
-            slot = list_slot[k]
-            share = wp.abs(opacity) * transmittance
-            if slot >= 0:
-                share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
-            else:
-                slot = -1 - slot
-            if opacity < 0.0:
-                share = wp.cw_mul(share, paint_columns[slot, 3, x])
-            seen[slot, x] = share
-            transmittance = transmittance - share
+@functools.cache
+def make_visibility(column: Any) -> wp.Kernel:
+    """Return a kernel that computes what is visible of shapes, for vectors of type ``column``."""
+
+    @wp.kernel(name="visibility", module="unique", module_options=constants.MODULE_OPTIONS)
+    def visibility(
+        # In:
+        offset: wp.int32,
+        lane_columns: wp.int32,  # columns of a tile that a thread handles
+        tile_first: wp.array[wp.int32],  # [tile_count]
+        tile_stop: wp.array[wp.int32],  # [tile_count]
+        list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
+        list_paint: wp.array[wp.vec4],  # [slot_capacity] opacity last, negative of gradients
+        coverage: wp.array2d[column],  # [slot_capacity, columns]
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] of gradients: opacity last
+        # Out:
+        seen: wp.array2d[column],  # [slot_capacity, columns] written for slots on the lists; others kept
+    ):
+        """Compute opacity x coverage x transmittance pixel by pixel: the image changes by seen x d where a
+        shape's colour changes by d. One thread a tile and lane.
+        """
+        i, lane = wp.tid()
+        tile = offset + i
+        for x in range(lane * lane_columns, (lane + 1) * lane_columns):
+            transmittance = column(1.0)
+            for k in range(tile_first[tile], tile_stop[tile]):
+                opacity = list_paint[k][3]
+                slot = list_slot[k]
+                share = wp.abs(opacity) * transmittance
+                if slot >= 0:
+                    share = wp.cw_mul(share, wp.abs(coverage[slot, x]))
+                else:
+                    slot = -1 - slot
+                if opacity < 0.0:
+                    share = wp.cw_mul(share, paint_columns[slot, 3, x])
+                seen[slot, x] = share
+                transmittance = transmittance - share
+
+    return visibility

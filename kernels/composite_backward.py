@@ -6,12 +6,13 @@ dL/d alpha_i = T_i dot(c_i, G) - behind_i / (1 - alpha_i).
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint.flat import paint_against
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -20,20 +21,23 @@ TINY = wp.constant(1.0e-9)
 
 
 @wp.func
-def slope_of(mapping: wp.int32, signed: column) -> column:
+def slope_of(mapping: wp.int32, signed: Any):
     """Return d coverage / ds: the sign of s, 0 where it is clamped; or what the product leaves."""
-    slope = column(1.0) - wp.abs(signed)
+    one = type(signed)(1.0)
+    slope = one - wp.abs(signed)
     if mapping == constants.AREA:
-        slope = wp.min(STEEP * slope, column(1.0))
-        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, column(-1.0)), column(1.0)))
+        slope = wp.min(STEEP * slope, one)
+        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
     return slope
 
 
 @functools.cache
-def make_backward(*, painted: bool) -> wp.Kernel:
+def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
     """Return the adjoint for opacities below 1.
 
-    ``painted``: whether there may be gradients and pictures, or a transparent canvas.
+    Args:
+        column: type of its vectors of pixels.
+        painted: whether there may be gradients and pictures, or a transparent canvas.
     """
     name = "paint_backward" if painted else "composite_backward"
 
@@ -47,13 +51,15 @@ def make_backward(*, painted: bool) -> wp.Kernel:
         tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity]
         list_paint: wp.array[wp.vec4],  # [slot_capacity]
-        coverage: wp.array2d[column],  # [slot_capacity, TILE]
+        coverage: wp.array2d[column],  # [slot_capacity, columns]
         mapping: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-        image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass
-        image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
+        image: wp.array3d[column],  # [tile_count, planes, columns] of the forward pass
+        image_grad: wp.array3d[column],  # [tile_count, planes, columns]
         # Out:
-        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] replaced by their gradients
-        sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] replaced by their gradients
+        sum_grad: wp.array2d[
+            column
+        ],  # [slot_capacity, columns] of s, visible PARTIAL slots; coverage's memory
         slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3), opacity by pixel row: one lane
         slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
     ):

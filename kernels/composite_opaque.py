@@ -8,12 +8,15 @@ opaque shape further back than what is seen (``most`` of ``bins.list_visible``):
 its opacity is worth.
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.composite_backward import slope_of
 from warpsplat.kernels.paint.flat import paint_against
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -23,9 +26,9 @@ TINY = wp.constant(1.0e-9)
 
 @wp.func
 def premultiplied_grads(
-    image: wp.array3d[column],
-    hit: wp.array2d[column],
-    image_grad: wp.array3d[column],
+    image: wp.array3d[Any],
+    hit: wp.array2d[Any],
+    image_grad: wp.array3d[Any],
     tile: wp.int32,
     x: wp.int32,
 ):
@@ -34,29 +37,32 @@ def premultiplied_grads(
 
     Opacities that are no longer divided by, and pixels that are hit throughout, have none.
     """
-    one = column(1.0)
+    one = image.dtype(1.0)
     along = wp.cw_mul(image[tile, 0, x], image_grad[tile, 0, x])
     along = along + wp.cw_mul(image[tile, 1, x], image_grad[tile, 1, x])
     along = along + wp.cw_mul(image[tile, 2, x], image_grad[tile, 2, x])
     touched = hit[tile, x]
     opaque = image[tile, 3, x]
     divisor = wp.max(opaque, constants.NOTHING * one)
-    above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), column(0.0)), one)
+    above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), 0.0 * one), one)
     opacity_grad = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
     partly = wp.min(STEEP * (one - touched), one)
     hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, TINY * one)), partly)
     return wp.cw_div(touched, divisor), opacity_grad, hit_grad
 
 
-def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Kernel:
+@functools.cache
+def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.Kernel:
     """Return the adjoint for opacities up to 1.
 
     Args:
-        name: of the kernel.
+        column: type of its vectors of pixels.
         painted: whether there may be gradients and pictures, or a transparent canvas.
         straight: whether the colours are straight, see ``composite.make_forward``; then the gradient of hit
             is added to that of each coverage.
     """
+    painted = painted or straight
+    name = "straight_backward" if straight else "opaque_paint_backward" if painted else "opaque_backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
@@ -67,16 +73,18 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
         tile_stop: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
-        coverage: wp.array2d[column],  # [slot_capacity, TILE]
+        coverage: wp.array2d[column],  # [slot_capacity, columns]
         mapping: wp.int32,  # how a coverage follows from s: AREA or PRODUCT
-        image: wp.array3d[column],  # [tile_count, planes, TILE] of the forward pass; straight only
-        hit: wp.array2d[column],  # [tile_count, TILE] of the forward pass; straight only
-        image_grad: wp.array3d[column],  # [tile_count, planes, TILE]
+        image: wp.array3d[column],  # [tile_count, planes, columns] of the forward pass; straight only
+        hit: wp.array2d[column],  # [tile_count, columns] of the forward pass; straight only
+        image_grad: wp.array3d[column],  # [tile_count, planes, columns]
         background: wp.vec3,
         # Out:
         transmittances: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists; scratch
-        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] replaced by their gradients
-        sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, visible PARTIAL slots; coverage's memory
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] replaced by their gradients
+        sum_grad: wp.array2d[
+            column
+        ],  # [slot_capacity, columns] of s, visible PARTIAL slots; coverage's memory
         slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3), opacity by pixel row: one lane
         slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
     ):
@@ -185,8 +193,3 @@ def make_backward(name: str, *, painted: bool, straight: bool = False) -> wp.Ker
                     slot_columns[slot, 3] = opacity_grad
 
     return backward
-
-
-opaque_backward = make_backward("opaque_backward", painted=False)
-opaque_paint_backward = make_backward("opaque_paint_backward", painted=True)
-straight_backward = make_backward("straight_backward", painted=True, straight=True)

@@ -24,13 +24,9 @@ from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.kernels import constants
-from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.backend import GPU_LANES, Backend
 from warpsplat.scene import Kind
 from warpsplat.tools.bench import bench_scene, bench_target
-
-CUDA_LANES = constants.TILE
-"""Threads that share a tile on a GPU, see ``Backend.on``."""
 
 BANDWIDTH = 3.35e12
 """Of an H100's memory [bytes/s]."""
@@ -62,7 +58,7 @@ WATCHED = (
 """Functions whose time on the host is measured."""
 
 
-def scene_step(kind: str, count: int, width: int, height: int, lanes: int = CUDA_LANES) -> Step:
+def scene_step(kind: str, count: int, width: int, height: int, lanes: int = GPU_LANES) -> Step:
     """Return a step on a scene of ``warpsplat bench``, divided as on a GPU, that moves nothing."""
     scene = bench_scene(kind, count, (width, height), 0.9, 0)
     settings = Settings(

@@ -10,11 +10,14 @@ Adjoint: a piece with extent (dx, dy), moved by v, changes its pixel's area by d
 pixel's. An edge's ends take (1 - s) and s of it, s the edge's parameter at the middle of the piece.
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage.rows import tile_row
-from warpsplat.kernels.tile import column
+from warpsplat.kernels.tile import tile_column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -225,15 +228,15 @@ def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32)
 
 @wp.func
 def sum_columns(
-    coverage: wp.array2d[column],
+    coverage: wp.array2d[tile_column],
     slot_state: wp.array[wp.int32],
     slot_winding: wp.array[wp.int32],
     first: wp.int32,
     last: wp.int32,
 ):
     """Compute prefix sums along the rows of the slots [first, last), clamped: 16 rows at a time."""
-    total = column(0.0)
-    one = column(1.0)
+    total = tile_column(0.0)
+    one = tile_column(1.0)
     for s in range(first, last):
         if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
             for x in range(constants.TILE):
@@ -275,62 +278,82 @@ def sum_row(
             total = float(slot_winding[s])
 
 
-@wp.kernel
-def fill_forward(
-    # In:
-    offset: wp.int32,
-    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles: one, or all
-    own_part: wp.int32,  # of the shapes to cover
-    part: wp.array[wp.int32],  # [shape_count]
-    rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
-    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    slot_winding: wp.array[wp.int32],  # [slot_capacity]
-    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
-    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
-    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
-    # Out:
-    coverage: wp.array2d[column],  # [slot_capacity, TILE] signed, in [-1, 1]
-    coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
-):
-    """Compute the coverage of PARTIAL slots, in rows of tiles with a visible one. One thread a row of tiles
-    of a shape (that of its leftmost slot) and lane.
+@functools.cache
+def make_forward(column: Any) -> wp.Kernel:
+    """Return the kernel that computes coverages, for vectors of type ``column``.
+
+    It goes by a tile's whole columns; or, a thread each, by rows of pixels.
     """
-    i, lane = wp.tid()
-    slot = offset + i
-    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
-    shape = row[0]
-    if shape < 0:
-        return
-    if part[shape] != own_part:
-        return
-    end = slot + row[2]
-    if not any_visible(slot_state, slot, end):
-        return
-    for s in range(slot, end):
-        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
-            for x in range(constants.TILE):
-                if lane_rows == constants.TILE:
-                    coverage[s, x] = column(0.0)
-                else:
-                    coverage_pixels[s, constants.TILE * x + lane] = 0.0
-    top = constants.TILE * row[3]
-    row_first = top + lane * lane_rows
-    left = float(constants.TILE * row[1])
-    for j in range(vertex_first[shape], vertex_last[shape]):
-        a = vertex[j]
-        b = vertex[vertex_next[j]]
-        add_edge(
-            coverage_pixels, slot, a, b, left, constants.TILE * row[2], top, row_first, row_first + lane_rows
-        )
-    if lane_rows == constants.TILE and rule[shape] == constants.NONZERO:
-        sum_columns(coverage, slot_state, slot_winding, slot, end)
-    else:
-        for y in range(lane * lane_rows, (lane + 1) * lane_rows):
-            sum_row(coverage_pixels, slot_state, slot_winding, slot, end, y, rule[shape])
+    by_rows = column is not tile_column
+    lane_rows = 1 if by_rows else constants.TILE
+
+    @wp.kernel(name="fill_forward", module="unique", module_options=constants.MODULE_OPTIONS)
+    def fill_forward(
+        # In:
+        offset: wp.int32,
+        own_part: wp.int32,  # of the shapes to cover
+        part: wp.array[wp.int32],  # [shape_count]
+        rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
+        slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        slot_winding: wp.array[wp.int32],  # [slot_capacity]
+        shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+        vertex_first: wp.array[wp.int32],  # [shape_count]
+        vertex_last: wp.array[wp.int32],  # [shape_count]
+        vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
+        vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+        # Out:
+        coverage: wp.array2d[column],  # [slot_capacity, columns] signed, in [-1, 1]
+        coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
+    ):
+        """Compute the coverage of PARTIAL slots, in rows of tiles with a visible one. One thread a row of
+        tiles of a shape (that of its leftmost slot) and lane.
+        """
+        i, lane = wp.tid()
+        slot = offset + i
+        row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+        shape = row[0]
+        if shape < 0:
+            return
+        if part[shape] != own_part:
+            return
+        end = slot + row[2]
+        if not any_visible(slot_state, slot, end):
+            return
+        for s in range(slot, end):
+            if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
+                for x in range(constants.TILE):
+                    if by_rows:
+                        coverage_pixels[s, constants.TILE * x + lane] = 0.0
+                    else:
+                        coverage[s, x] = column(0.0)
+        top = constants.TILE * row[3]
+        row_first = top + lane * lane_rows
+        left = float(constants.TILE * row[1])
+        for j in range(vertex_first[shape], vertex_last[shape]):
+            a = vertex[j]
+            b = vertex[vertex_next[j]]
+            add_edge(
+                coverage_pixels,
+                slot,
+                a,
+                b,
+                left,
+                constants.TILE * row[2],
+                top,
+                row_first,
+                row_first + lane_rows,
+            )
+        if by_rows:
+            sum_row(coverage_pixels, slot_state, slot_winding, slot, end, lane, rule[shape])
+        elif rule[shape] == constants.NONZERO:
+            sum_columns(coverage, slot_state, slot_winding, slot, end)
+        else:
+            for y in range(constants.TILE):
+                sum_row(coverage_pixels, slot_state, slot_winding, slot, end, y, rule[shape])
+
+    return fill_forward
 
 
 @wp.func

@@ -10,11 +10,14 @@ Adjoint: moving the nearest segment's ends by v_a, v_b changes d by -n . ((1 - t
 point's parameter (which is at a minimum, or at an end). The turning of n is of second order and left out.
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage.rows import tile_row
-from warpsplat.kernels.tile import column
+from warpsplat.kernels.tile import tile_column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -250,7 +253,8 @@ def cover_slot(
     """Turn the distances of a slot's pixels in ``rows`` into coverages; return the state of these pixels."""
     most = float(0.0)
     least = float(1.0)
-    for x in range(constants.TILE):
+    columns = int(constants.TILE)  # not unrolled, which takes registers
+    for x in range(columns):
         for y in range(rows[0], rows[1]):
             p = constants.TILE * x + y - top
             value = pixels[s, p]
@@ -271,85 +275,98 @@ def cover_slot(
     return constants.COVERED
 
 
-@wp.kernel
-def stroke_forward(
-    # In:
-    offset: wp.int32,
-    lane_rows: wp.int32,  # pixel rows of a tile that a thread handles
-    slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    part: wp.array[wp.int32],  # [shape_count]
-    widths: wp.array[wp.float32],  # [shape_count] canvas units
-    scale: wp.float32,
-    shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
-    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
-    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
-    # Out:
-    coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
-    coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
-    segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS] nearest segment (its first vertex)
-    slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
-    slot_near: wp.array2d[wp.int32],  # [slot_capacity, lanes] whether a segment is near
-):
-    """Find the nearest segment of each pixel, then coverages. One thread a row of tiles of a shape (that of
-    its leftmost slot) and lane.
+@functools.cache
+def make_forward(column: Any) -> wp.Kernel:
+    """Return the kernel that covers strokes, for vectors of type ``column``.
+
+    A thread has all rows of a row of tiles, or one row of pixels.
     """
-    i, lane = wp.tid()
-    slot = offset + i
-    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
-    shape = row[0]
-    if shape < 0:
-        return
-    if part[shape] != constants.STROKE:
-        return
-    half = half_width(widths[shape], scale)
-    reach = half + HALF_DIAGONAL
-    # What is stored first is reach^2 - distance^2, 0 where nothing is near. From here on a pixel is covered.
-    inside = float(FAR)
-    if half > HALF_DIAGONAL:
-        inside = reach * reach - (half - HALF_DIAGONAL) * (half - HALF_DIAGONAL)
-    left = constants.TILE * row[1]
-    top = constants.TILE * row[3]
-    columns = wp.vec2i(left, left + constants.TILE * row[2])
-    rows = wp.vec2i(top + lane * lane_rows, top + (lane + 1) * lane_rows)
-    for s in range(slot, slot + row[2]):
-        slot_near[s, lane] = 0
-        for x in range(constants.TILE):
-            if lane_rows == constants.TILE:
-                coverage[s, x] = column(0.0)
-            else:
-                coverage_pixels[s, constants.TILE * x + lane] = 0.0
-    for j in range(vertex_first[shape], vertex_last[shape]):
-        if vertex_next[j] == constants.NONE:
-            continue
-        a = vertex[j]
-        b = vertex[vertex_next[j]]
-        if wp.min(a[1], b[1]) - reach < float(rows[1]) and wp.max(a[1], b[1]) + reach > float(rows[0]):
-            over = overhang(vertex, vertex_next, j, vertex_first[shape], reach)
-            keep_nearest(
-                coverage_pixels,
-                segment,
-                slot_near,
-                vertex,
-                j,
-                b,
-                over,
-                reach,
-                inside,
-                slot,
-                lane,
-                columns,
-                rows,
-                top,
-            )
-    for s in range(slot, slot + row[2]):
-        state = int(constants.UNCOVERED)
-        if slot_near[s, lane] == 1:
-            at = left + constants.TILE * (s - slot)
-            state = cover_slot(coverage_pixels, segment, vertex, vertex_next, s, at, top, rows, half, inside)
-        wp.atomic_or(slot_state, s, state)
+    by_rows = column is not tile_column
+    lane_rows = 1 if by_rows else constants.TILE
+
+    @wp.kernel(name="stroke_forward", module="unique", module_options=constants.MODULE_OPTIONS)
+    def stroke_forward(
+        # In:
+        offset: wp.int32,
+        slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        part: wp.array[wp.int32],  # [shape_count]
+        widths: wp.array[wp.float32],  # [shape_count] canvas units
+        scale: wp.float32,
+        shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
+        vertex_first: wp.array[wp.int32],  # [shape_count]
+        vertex_last: wp.array[wp.int32],  # [shape_count]
+        vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
+        vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+        # Out:
+        coverage: wp.array2d[column],  # [slot_capacity, columns] in [0, 1]
+        coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
+        segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS] nearest segment (its first vertex)
+        slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
+        slot_near: wp.array2d[wp.int32],  # [slot_capacity, row_lanes] whether a segment is near
+    ):
+        """Find the nearest segment of each pixel, then coverages. One thread a row of tiles of a shape (that
+        of its leftmost slot) and lane.
+        """
+        i, lane = wp.tid()
+        slot = offset + i
+        row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+        shape = row[0]
+        if shape < 0:
+            return
+        if part[shape] != constants.STROKE:
+            return
+        half = half_width(widths[shape], scale)
+        reach = half + HALF_DIAGONAL
+        # What is stored first is reach^2 - distance^2, 0 where nothing is near; from here on a pixel is
+        # covered.
+        inside = float(FAR)
+        if half > HALF_DIAGONAL:
+            inside = reach * reach - (half - HALF_DIAGONAL) * (half - HALF_DIAGONAL)
+        left = constants.TILE * row[1]
+        top = constants.TILE * row[3]
+        columns = wp.vec2i(left, left + constants.TILE * row[2])
+        rows = wp.vec2i(top + lane * lane_rows, top + (lane + 1) * lane_rows)
+        for s in range(slot, slot + row[2]):
+            slot_near[s, lane] = 0
+            for x in range(constants.TILE):
+                if by_rows:
+                    coverage_pixels[s, constants.TILE * x + lane] = 0.0
+                else:
+                    coverage[s, x] = column(0.0)
+        for j in range(vertex_first[shape], vertex_last[shape]):
+            if vertex_next[j] == constants.NONE:
+                continue
+            a = vertex[j]
+            b = vertex[vertex_next[j]]
+            if wp.min(a[1], b[1]) - reach < float(rows[1]) and wp.max(a[1], b[1]) + reach > float(rows[0]):
+                over = overhang(vertex, vertex_next, j, vertex_first[shape], reach)
+                keep_nearest(
+                    coverage_pixels,
+                    segment,
+                    slot_near,
+                    vertex,
+                    j,
+                    b,
+                    over,
+                    reach,
+                    inside,
+                    slot,
+                    lane,
+                    columns,
+                    rows,
+                    top,
+                )
+        for s in range(slot, slot + row[2]):
+            state = int(constants.UNCOVERED)
+            if slot_near[s, lane] == 1:
+                at = left + constants.TILE * (s - slot)
+                state = cover_slot(
+                    coverage_pixels, segment, vertex, vertex_next, s, at, top, rows, half, inside
+                )
+            wp.atomic_or(slot_state, s, state)
+
+    return stroke_forward
 
 
 @wp.kernel

@@ -3,7 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -13,9 +13,9 @@ C2 = wp.constant(0.03 * 0.03)
 
 
 @wp.func
-def rows_between(y0: wp.int32, y1: wp.int32) -> column:
+def rows_between(y0: wp.int32, y1: wp.int32) -> tile_column:
     """1 in the rows from ``y0`` to ``y1``, 0 in the others."""
-    rows = column(0.0)
+    rows = tile_column(0.0)
     y = int(0)
     while y < constants.TILE:  # a range of constants would be unrolled, and take seconds to compile
         rows[y] = wp.where(y >= y0, 1.0, 0.0) * wp.where(y < y1, 1.0, 0.0)
@@ -27,9 +27,9 @@ def rows_between(y0: wp.int32, y1: wp.int32) -> column:
 def image_loss(
     # In:
     offset: wp.int32,
-    image: wp.array3d[column],  # [tile_count, 3, TILE]
-    target: wp.array3d[column],  # [tile_count, 3, TILE]
-    importance: wp.array2d[column],  # [tile_count, TILE] weight of a pixel, 0 outside of the image
+    image: wp.array3d[tile_column],  # [tile_count, 3, columns]
+    target: wp.array3d[tile_column],  # [tile_count, 3, columns]
+    importance: wp.array2d[tile_column],  # [tile_count, columns] weight of a pixel, 0 outside of the image
     tile_cache: wp.array[wp.int32],  # [tile_count] the loss of CACHED tiles is kept, if it is known
     weighted: wp.int32,  # whether that is anything but 1 in the image; if not, it is not read
     width: wp.int32,  # [px]
@@ -39,11 +39,9 @@ def image_loss(
     similarity_weight: wp.float32,
     value_count: wp.int32,  # pixels x channels
     # Out:
-    image_grad: wp.array3d[column],  # [tile_count, 3, TILE]
-    loss: wp.array2d[wp.float32],  # [tile_count, 3] sums of squares, unweighted; below 0: not known
-    similarity: wp.array2d[
-        wp.float32
-    ],  # [tile_count, 3] sums over windows of SSIM x weight; 0 without weight
+    image_grad: wp.array3d[tile_column],  # [tile_count, 3, columns]
+    loss: wp.array3d[wp.float32],  # [tile_count, 3, 1] sums of squares, unweighted; below 0: not known
+    similarity: wp.array3d[wp.float32],  # [tile_count, 3, 1] sums of SSIM x weight; 0 without weight
 ):
     """Mean over pixels and channels of w e^2 (paper eq. 12, first term), and ``similarity_weight`` x the mean
     of w (1 - SSIM); w is the ``importance``, e the error. One thread a tile and channel.
@@ -55,9 +53,9 @@ def image_loss(
     three from top to bottom. What belongs to one of the latter lies in each of its rows, so that all but the
     sums over them is arithmetic with columns.
     """
-    i, channel = wp.tid()
+    i, channel, _ = wp.tid()
     tile = offset + i
-    if tile_cache[tile] == constants.CACHED and loss[tile, channel] >= 0.0:
+    if tile_cache[tile] == constants.CACHED and loss[tile, channel, 0] >= 0.0:
         return
     columns = wp.min(width - tile % tiles_x * constants.TILE, constants.TILE)
     rows = wp.min(height - tile / tiles_x * constants.TILE, constants.TILE)
@@ -71,25 +69,25 @@ def image_loss(
     third = rows_between(border2, rows)
     heights = float(border1) * first + float(border2 - border1) * second + float(rows - border2) * third
     inside = rows_between(0, rows)
-    zero = column(0.0)
-    one = column(1.0)
-    c1 = column(C1)
-    c2 = column(C2)
+    zero = tile_column(0.0)
+    one = tile_column(1.0)
+    c1 = tile_column(C1)
+    c2 = tile_column(C2)
     factor = 2.0 / float(value_count)
     share = 2.0 * similarity_weight / float(value_count)
-    squares = column(0.0)
-    similar = column(0.0)
+    squares = tile_column(0.0)
+    similar = tile_column(0.0)
     x0 = int(0)
     while x0 < columns:
         x1 = wp.min((x0 + shift_x) / WINDOW * WINDOW + WINDOW - shift_x, columns)
-        a = column(0.0)
-        b = column(0.0)
-        c = column(0.0)
+        a = tile_column(0.0)
+        b = tile_column(0.0)
+        c = tile_column(0.0)
         if similarity_weight > 0.0:
-            sum_u = column(0.0)
-            sum_v = column(0.0)
-            sum_squares = column(0.0)
-            sum_uv = column(0.0)
+            sum_u = tile_column(0.0)
+            sum_v = tile_column(0.0)
+            sum_squares = tile_column(0.0)
+            sum_uv = tile_column(0.0)
             weight = float(x1 - x0) * inside
             for x in range(x0, x1):
                 u = image[tile, channel, x]
@@ -102,11 +100,11 @@ def image_loss(
                 weight = zero
                 for x in range(x0, x1):
                     weight = weight + importance[tile, x]
-            mean_u = column(0.0)
-            mean_v = column(0.0)
-            squared = column(0.0)
-            product = column(0.0)
-            total_weight = column(0.0)
+            mean_u = tile_column(0.0)
+            mean_v = tile_column(0.0)
+            squared = tile_column(0.0)
+            product = tile_column(0.0)
+            total_weight = tile_column(0.0)
             y0 = int(0)
             y1 = border1
             window = first
@@ -163,5 +161,5 @@ def image_loss(
         x0 = x1
     for x in range(columns, constants.TILE):
         image_grad[tile, channel, x] = zero
-    loss[tile, channel] = total(wp.cw_mul(inside, squares))
-    similarity[tile, channel] = total(wp.cw_mul(inside, similar))
+    loss[tile, channel, 0] = total(wp.cw_mul(inside, squares))
+    similarity[tile, channel, 0] = total(wp.cw_mul(inside, similar))

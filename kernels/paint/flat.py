@@ -5,10 +5,13 @@ it reflects, and its colour times the image's gradient. Gradients (``gradient``)
 by pixel.
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -29,54 +32,62 @@ def shape_paint(
 
 
 @wp.func
-def paint_times(paint: wp.vec4, channel: wp.int32, share: column) -> column:
+def paint_times(paint: wp.vec4, channel: wp.int32, share: Any):
     """Return what a shape adds to a channel of a column of pixels that reflect ``share`` of the light."""
     return paint[channel] * share
 
 
 @wp.func
-def paint_against(paint: wp.vec4, red: column, green: column, blue: column) -> column:
+def paint_against(paint: wp.vec4, red: Any, green: Any, blue: Any):
     """Return the dot product of the paint's colour with a column's gradient."""
     return paint[0] * red + paint[1] * green + paint[2] * blue
 
 
-@wp.kernel
-def flat_backward(
-    # In:
-    offset: wp.int32,
-    lanes: wp.int32,
-    paint: wp.array[wp.int32],  # [shape_count]
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
-    slot_columns: wp.array2d[column],  # [slot_capacity, 4]
-    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
-    # Out:
-    colors_grad: wp.array[wp.vec3],  # [shape_count] written
-    opacities_grad: wp.array[wp.float32],  # [shape_count] written
-):
-    """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a shape."""
-    shape = offset + wp.tid()
-    red = column(0.0)
-    green = column(0.0)
-    blue = column(0.0)
-    opacity = column(0.0)
-    sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    for slot in range(slot_first[shape], slot_last[shape]):
-        state = slot_state[slot]
-        if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
-            if lanes == 1:
-                red = red + slot_columns[slot, 0]
-                green = green + slot_columns[slot, 1]
-                blue = blue + slot_columns[slot, 2]
-                opacity = opacity + slot_columns[slot, 3]
-            else:
-                for lane in range(lanes):
-                    sums = sums + slot_grad[slot, lane]
-    if paint[shape] != constants.FLAT:
+@functools.cache
+def make_backward(column: Any) -> wp.Kernel:
+    """Return the adjoint of flat paints, for vectors of type ``column``."""
+
+    @wp.kernel(name="flat_backward", module="unique", module_options=constants.MODULE_OPTIONS)
+    def flat_backward(
+        # In:
+        offset: wp.int32,
+        lanes: wp.int32,
+        paint: wp.array[wp.int32],  # [shape_count]
+        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_state: wp.array[wp.int32],  # [slot_capacity]
+        slot_columns: wp.array2d[column],  # [slot_capacity, 4]
+        slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
+        # Out:
+        colors_grad: wp.array[wp.vec3],  # [shape_count] written
+        opacities_grad: wp.array[wp.float32],  # [shape_count] written
+    ):
+        """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a
+        shape.
+        """
+        shape = offset + wp.tid()
         red = column(0.0)
         green = column(0.0)
         blue = column(0.0)
-        sums = wp.vec4(0.0, 0.0, 0.0, sums[3])
-    colors_grad[shape] = wp.vec3(sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue))
-    opacities_grad[shape] = sums[3] + total(opacity)
+        opacity = column(0.0)
+        sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
+        for slot in range(slot_first[shape], slot_last[shape]):
+            state = slot_state[slot]
+            if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
+                if lanes == 1:
+                    red = red + slot_columns[slot, 0]
+                    green = green + slot_columns[slot, 1]
+                    blue = blue + slot_columns[slot, 2]
+                    opacity = opacity + slot_columns[slot, 3]
+                else:
+                    for lane in range(lanes):
+                        sums = sums + slot_grad[slot, lane]
+        if paint[shape] != constants.FLAT:
+            red = column(0.0)
+            green = column(0.0)
+            blue = column(0.0)
+            sums = wp.vec4(0.0, 0.0, 0.0, sums[3])
+        colors_grad[shape] = wp.vec3(sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue))
+        opacities_grad[shape] = sums[3] + total(opacity)
+
+    return flat_backward

@@ -6,6 +6,9 @@ second stop times the difference of the two. Two ascending stops (a ramp) have k
 (a chain, in any order) only those intervals that a column reaches are computed, which are one or two.
 """
 
+import functools
+from typing import Any, Literal
+
 import warp as wp
 
 from warpsplat.kernels import constants
@@ -24,7 +27,7 @@ from warpsplat.kernels.paint.gradient import (
     to_unit,
     to_unit_adjoint,
 )
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -33,43 +36,44 @@ TINY = wp.constant(1.0e-12)
 
 
 @wp.func
-def rows() -> column:
-    """Return the indices of a column's pixels."""
-    result = column(0.0)
-    for i in range(constants.TILE):
+def rows(column: Any):
+    """Return a vector of a column's type with the indices of its pixels."""
+    result = type(column)(0.0)
+    for i in range(len(column)):
         result[i] = float(i)
     return result
 
 
 @wp.func
-def roots(squares: column) -> column:
+def roots(squares: Any):
     """Return the square root of each element."""
-    result = column(0.0)
-    for i in range(constants.TILE):
+    result = type(squares)(0.0)
+    for i in range(len(squares)):
         result[i] = wp.sqrt(squares[i])
     return result
 
 
 @wp.func
-def share_of_second(t: column, start: wp.float32, width: wp.float32) -> column:
+def share_of_second(t: Any, start: wp.float32, width: wp.float32):
     """Return the share of the second stop at parameters ``t``."""
-    linear = (t - column(start)) / width
-    return wp.min(wp.max(linear, column(0.0)), column(1.0))
+    linear = (t - type(t)(start)) / width
+    return wp.min(wp.max(linear, type(t)(0.0)), type(t)(1.0))
 
 
 @wp.func
-def share_of_next(t: column, before: wp.float32, after: wp.float32) -> column:
+def share_of_next(t: Any, before: wp.float32, after: wp.float32):
     """Return the share of an interval's second stop at parameters ``t``; two stops in one place are a
     step.
     """
     if after > before:
         return share_of_second(t, before, after - before)
-    return wp.min(wp.max(STEEP * (t - column(before)) + column(1.0), column(0.0)), column(1.0))
+    one = type(t)(1.0)
+    return wp.min(wp.max(STEEP * (t - type(t)(before)) + one, type(t)(0.0)), one)
 
 
 @wp.func
 def color_chain(
-    g: Gradients, shape: wp.int32, t: column, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[column]
+    g: Gradients, shape: wp.int32, t: Any, slot: wp.int32, x: wp.int32, paint_columns: wp.array3d[Any]
 ):
     """Colour a column of pixels at parameters ``t`` of a chain."""
     first = g.stop_first[shape]
@@ -77,19 +81,19 @@ def color_chain(
     lowest = wp.min(t)
     highest = wp.max(t)
     color = g.stop_colors[first]
-    red = column(color[0])
-    green = column(color[1])
-    blue = column(color[2])
-    opacity = column(g.stop_opacities[first])
+    red = type(t)(color[0])
+    green = type(t)(color[1])
+    blue = type(t)(color[2])
+    opacity = type(t)(g.stop_opacities[first])
     before = g.stop_offsets[first]
     for k in range(first, last - 1):
         after = wp.max(before, g.stop_offsets[k + 1])
         color = g.stop_colors[k + 1]
         if lowest >= after:
-            red = column(color[0])
-            green = column(color[1])
-            blue = column(color[2])
-            opacity = column(g.stop_opacities[k + 1])
+            red = type(t)(color[0])
+            green = type(t)(color[1])
+            blue = type(t)(color[2])
+            opacity = type(t)(g.stop_opacities[k + 1])
         elif highest >= before:
             share = share_of_next(t, before, after)
             between = color - g.stop_colors[k]
@@ -104,10 +108,15 @@ def color_chain(
     paint_columns[slot, 3, x] = opacity
 
 
-def make_forward(name: str, case: int) -> wp.Kernel:
-    """Return the kernel of RAMP, CHAIN or GENERAL gradients."""
+NAMES = {RAMP: "ramp", CHAIN: "chain", GENERAL: "gradient"}
 
-    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+
+@functools.cache
+def make_forward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
+    """Return the kernel of RAMP, CHAIN or GENERAL gradients, in vectors of type ``column``."""
+    height = column._length_
+
+    @wp.kernel(name=f"{NAMES[case]}_forward", module="unique", module_options=constants.MODULE_OPTIONS)
     def forward(
         # In:
         offset: wp.int32,
@@ -119,7 +128,7 @@ def make_forward(name: str, case: int) -> wp.Kernel:
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         g: Gradients,
         # Out:
-        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] colour and opacity
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] colour and opacity
         paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] the same memory
     ):
         """Colour the pixels of visible slots. One thread a slot and lane."""
@@ -147,22 +156,21 @@ def make_forward(name: str, case: int) -> wp.Kernel:
             low_opacity = g.stop_opacities[first]
             high_opacity = g.stop_opacities[first + 1]
         down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
-        row = rows()
+        row = rows(column(0.0))
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
             if case == GENERAL:
-                for y in range(constants.TILE):
-                    place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, y, scale))
+                for p in range(height * x, height * (x + 1)):
+                    place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, p, scale))
                     t = spread_out(own_spread, parameter(own_paint, own_focus, place)[0])
                     at = between_stops(g.stop_offsets, first, last, t[0])
                     color = (1.0 - at.share) * g.stop_colors[at.low] + at.share * g.stop_colors[at.high]
-                    p = constants.TILE * x + y
                     for channel in range(3):
                         paint_pixels[slot, channel, p] = color[channel]
                     opacity = g.stop_opacities[at.low]
                     opacity += at.share * (g.stop_opacities[at.high] - opacity)
                     paint_pixels[slot, 3, p] = opacity
             else:
-                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, height * x, scale))
                 ts = column(top[0]) + down[0] * row
                 if own_paint != constants.LINEAR:
                     v = column(top[1]) + down[1] * row
@@ -183,14 +191,14 @@ def make_forward(name: str, case: int) -> wp.Kernel:
 def chain_backward_column(
     g: Gradients,
     shape: wp.int32,
-    t: column,
+    t: Any,
     slot: wp.int32,
     x: wp.int32,
-    paint_columns: wp.array3d[column],
+    paint_columns: wp.array3d[Any],
     stop_offsets_grad: wp.array[wp.float32],
     stop_colors_grad: wp.array[wp.vec3],
     stop_opacities_grad: wp.array[wp.float32],
-) -> column:
+):
     """Add the gradients of a chain's stops in a column of pixels; return those of ``t``.
 
     The first stop takes all of a column's gradient but what the share of its interval passes on to the next
@@ -206,7 +214,7 @@ def chain_backward_column(
     highest = wp.max(t)
     color_rest = wp.vec3(total(red), total(green), total(blue))
     opacity_rest = total(opacity)
-    slope = column(0.0)
+    slope = type(t)(0.0)
     at = first
     before = g.stop_offsets[first]
     own_before = int(1)
@@ -234,8 +242,8 @@ def chain_backward_column(
                 step = step + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * opacity
                 step = step / (after - before)
                 # Beyond the two stops nothing changes with t.
-                step = wp.cw_mul(step, wp.min(STEEP * share, column(1.0)))
-                step = wp.cw_mul(step, wp.min(STEEP * (column(1.0) - share), column(1.0)))
+                step = wp.cw_mul(step, wp.min(STEEP * share, type(t)(1.0)))
+                step = wp.cw_mul(step, wp.min(STEEP * (type(t)(1.0) - share), type(t)(1.0)))
                 later = total(wp.cw_mul(share, step))
                 if own_before == 1:
                     stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
@@ -299,9 +307,7 @@ def gradient_backward(
             for p in range(constants.TILE * constants.TILE):
                 color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
                 opacity = paint_pixels[slot, 3, p]
-                place = to_unit(
-                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
-                )
+                place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, p, scale))
                 raw = parameter(paint[shape], focus[shape], place)
                 t = spread_out(spread[shape], raw[0])
                 at = between_stops(stop_offsets, first, last, t[0])
@@ -325,10 +331,14 @@ def gradient_backward(
     frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
 
-def make_backward(name: str, case: int) -> wp.Kernel:
-    """Return the adjoint of RAMP or CHAIN gradients."""
+@functools.cache
+def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
+    """Return the adjoint of RAMP, CHAIN or GENERAL gradients, in vectors of type ``column``."""
+    if case == GENERAL:
+        return gradient_backward
+    height = column._length_
 
-    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    @wp.kernel(name=f"{NAMES[case]}_backward", module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
         # In:
         offset: wp.int32,
@@ -339,7 +349,7 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         slot_tile: wp.array[wp.int32],  # [slot_capacity]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         g: Gradients,
-        paint_columns: wp.array3d[column],  # [paint_slots, 4, TILE] gradients of colour and opacity
+        paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] gradients of colour and opacity
         # Out:
         frames_grad: wp.array[frame],  # [shape_count] written
         stop_offsets_grad: wp.array[wp.float32],  # [stop_count] written
@@ -381,7 +391,7 @@ def make_backward(name: str, case: int) -> wp.Kernel:
                 stop_opacities_grad[i] = 0.0
         linear = g.paint[shape] == constants.LINEAR
         down = to_unit(f, wp.vec2(f[0], f[1] + 1.0 / scale))
-        row = rows()
+        row = rows(column(0.0))
         # Derivatives by the point in unit space, and the same times each coordinate.
         by_u = zero
         by_v = zero
@@ -389,12 +399,12 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         u_by_v = zero
         v_by_u = zero
         v_by_v = zero
-        columns = int(constants.TILE)  # a loop that is not unrolled, which takes long to compile
+        columns = int(constants.TILE_PIXELS // height)  # not unrolled, which takes long to compile
         for slot in range(slot_first[shape], slot_last[shape]):
             state = slot_state[slot]
             if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
                 for x in range(columns):
-                    top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, x, 0, scale))
+                    top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, height * x, scale))
                     u = column(top[0]) + down[0] * row
                     v = column(top[1]) + down[1] * row
                     t = u
@@ -462,11 +472,6 @@ def make_backward(name: str, case: int) -> wp.Kernel:
         frames_grad[shape] = frame(origin[0], origin[1], along[0], along[1], across[0], across[1])
 
     return backward
-
-
-CASES = (("ramp", RAMP), ("chain", CHAIN), ("gradient", GENERAL))
-FORWARD = [make_forward(f"{name}_forward", case) for name, case in CASES]
-BACKWARD = [*(make_backward(f"{name}_backward", case) for name, case in CASES[:2]), gradient_backward]
 
 
 @wp.kernel

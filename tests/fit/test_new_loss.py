@@ -19,8 +19,9 @@ from warpsplat.scene import Scene
 
 
 def launch_blue(program: Program, inputs: LossInputs, weight: float) -> None:
-    film, tiles = inputs.renderer.film, inputs.renderer.viewport.tile_count
-    program.launch(trials.blue_backward, tiles, film.buffers, inputs.target, weight=weight, split=True)
+    renderer = inputs.renderer
+    kernel, tiles = trials.make_blue_backward(renderer.backend.column), renderer.viewport.tile_count
+    program.launch(kernel, tiles, renderer.film.buffers, inputs.target, weight=weight, split=True)
 
 
 def launch_thin(program: Program, inputs: LossInputs, weight: float) -> None:

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-import warp as wp
 
 from tests.helpers import SPLAT, adjoint, coverage_images, relative_error, renderer_for
 from tests.reference.composite import composite
 from tests.reference.curves import tensors
 from tests.scenes import mixed_scene, random_scene, with_gradients
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
@@ -82,8 +80,8 @@ def test_removal_costs_match_brute_force(device: str, scene: Scene, weighted: bo
     renderer = renderer_for(scene, device)
     target = rng.uniform(size=renderer.read_image().shape).astype(np.float32)
     weights = rng.uniform(0, 2, (*target.shape[:2], 1)).astype(np.float32) ** weighted
-    aim = wp.array(to_tiles(target), dtype=column, device=device)
-    importance = wp.array(to_tiles(weights)[:, 0], dtype=column, device=device) if weighted else None
+    aim = renderer.backend.columns_of(to_tiles(target))
+    importance = renderer.backend.columns_of(to_tiles(weights)[:, 0]) if weighted else None
     got = renderer.removal_costs(aim, importance)
 
     def error(shown: Scene) -> float:

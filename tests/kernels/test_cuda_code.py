@@ -12,12 +12,13 @@ import warp as wp
 
 from tests.kernels import racing
 from tests.kernels.modules import all_kernels
+from warpsplat.kernels.tile import quad
 
 ARCHITECTURE = 75
 
 ATOMIC_FLOATS = re.compile(r"\b(atom|red)\.\S*\.b?f(16|32|64)")
 
-MODULES = {kernel.module.name: kernel.module for kernel in all_kernels()}
+MODULES = {kernel.module.name: kernel.module for kernel in all_kernels(quad)}
 
 
 def cuda_code(module: wp.Module, scratch: Path) -> str:
@@ -40,7 +41,7 @@ def cuda_code(module: wp.Module, scratch: Path) -> str:
 @pytest.mark.parametrize("name", MODULES)
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     text = cuda_code(MODULES[name], tmp_path)
-    for kernel in all_kernels():
+    for kernel in all_kernels(quad):
         if kernel.module.name == name:
             assert f".entry {kernel.key}_" in text
     assert not ATOMIC_FLOATS.search(text), "results would depend on the order of threads"

@@ -21,13 +21,16 @@ from tests.kernels.modules import all_kernels
 from tests.scenes import mixed_scene, with_gradients
 from tests.tracing.trace import KINDS, Race, Tracer, tracing
 from warpsplat.fit.settings import make_settings
+from warpsplat.kernels.tile import quad, tile_column
+from warpsplat.rendering.backend import GPU_LANES
 from warpsplat.rendering.program import Program
 from warpsplat.scene import Canvas
 
 THREADS = 2
 """Of steps: those for one are captured as a graph, which cannot be traced."""
 
-LANES = (1, 16)
+LANES = {1: tile_column, GPU_LANES: quad}
+"""Threads that share a tile, and the vectors of pixels that their kernels are made for."""
 
 TWICE, SAME, NEIGHBOUR, FLOATS = KINDS
 
@@ -96,7 +99,7 @@ def test_no_two_threads_meet(lanes: int) -> None:
     for tracer in (usual, shuffled):
         assert not unexpected(tracer.races)
         assert not tracer.outside, "accesses outside of all arrays"
-        every = {kernel.key for kernel in all_kernels()}
+        every = {kernel.key for kernel in all_kernels(LANES[lanes])}
         assert every - tracer.kernels <= (
             {"tiles_to_pixels", "pixels_to_tiles"} if "torch" in needs.MISSING else set()
         )

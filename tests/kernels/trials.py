@@ -3,11 +3,13 @@
 (``test_elementary.py``).
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.elementary import angle_of, power, sine_and_cosine
-from warpsplat.kernels.tile import column
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
@@ -122,20 +124,26 @@ def boxes_backward(
         points_grad[i] = gradient
 
 
-@wp.kernel
-def blue_backward(
-    # In:
-    offset: wp.int32,
-    inside: wp.array2d[column],  # [tile_count, TILE]
-    value_count: wp.int32,  # pixels x channels
-    weight: wp.float32,
-    # Out:
-    image_grad: wp.array3d[column],  # [tile_count, 3, TILE] added to
-):
-    """Add the gradient of ``weight`` x (1 - the mean of blue)."""
-    tile = offset + wp.tid()
-    for x in range(TILE):
-        image_grad[tile, 2, x] = image_grad[tile, 2, x] - weight / float(value_count) * inside[tile, x]
+@functools.cache
+def make_blue_backward(column: Any) -> wp.Kernel:
+    """Return the adjoint of the mean of blue, for vectors of type ``column``."""
+
+    @wp.kernel(name="blue_backward", module="unique", module_options=constants.MODULE_OPTIONS)
+    def blue_backward(
+        # In:
+        offset: wp.int32,
+        inside: wp.array2d[column],  # [tile_count, columns]
+        value_count: wp.int32,  # pixels x channels
+        weight: wp.float32,
+        # Out:
+        image_grad: wp.array3d[column],  # [tile_count, 3, columns] added to
+    ):
+        """Add the gradient of ``weight`` x (1 - the mean of blue)."""
+        tile = offset + wp.tid()
+        for x in range(inside.shape[1]):
+            image_grad[tile, 2, x] = image_grad[tile, 2, x] - weight / float(value_count) * inside[tile, x]
+
+    return blue_backward
 
 
 @wp.kernel

@@ -55,7 +55,7 @@ def test_image_and_gradients(
     compare(scene, device, scale, GaussianModel(through_scales=through_scales))
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 def test_fills_and_strokes_of_different_lengths(device: str, lanes: int) -> None:
     compare(faded(mixed_scene(splines=False)), device, 1.0, GaussianModel(0.4, 1.2), lanes)
 

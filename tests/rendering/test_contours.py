@@ -18,7 +18,7 @@ SHAPES = [(Kind.FILL, Rule.NONZERO), (Kind.FILL, Rule.EVENODD), (Kind.STROKE, Ru
 
 
 @pytest.mark.parametrize(("kind", "rule"), SHAPES)
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 def test_image_and_gradients(device: str, kind: Kind, rule: Rule, lanes: int) -> None:
     compare(contours_scene(kind, rule, seed=3), device, 1.5, lanes=lanes)
 

@@ -17,13 +17,13 @@ def transparent(scene: Scene) -> Scene:
     return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 @pytest.mark.parametrize("scale", [1.0, 1.7])
 def test_gradients(device: str, lanes: int, scale: float) -> None:
     compare(with_gradients(mixed_scene(seed=1)), device, scale, lanes=lanes)
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 def test_transparent_canvas(device: str, lanes: int) -> None:
     compare(transparent(with_gradients(mixed_scene(seed=2))), device, lanes=lanes)
     compare(transparent(random_scene(Kind.FILL)), device, lanes=lanes)
@@ -38,7 +38,7 @@ def test_spread(device: str, paint: Paint, spread: Spread) -> None:
     compare(replace(scene, **traits), device)
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 @pytest.mark.parametrize("clear", [False, True])
 def test_ramps(device: str, lanes: int, clear: bool) -> None:
     """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
@@ -46,7 +46,7 @@ def test_ramps(device: str, lanes: int, clear: bool) -> None:
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [1, 64])
 @pytest.mark.parametrize("clear", [False, True])
 @pytest.mark.parametrize("offsets", [(0.15, 0.3, 0.42, 0.5, 0.95), (0.15, 0.4, 0.4, 0.6, 0.6)])
 def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[float, ...]) -> None:

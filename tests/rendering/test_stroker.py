@@ -50,7 +50,7 @@ SQUARE = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("cap", "join", "dash"), SQUARE)
 def test_all_styles(device: str, cap: Cap, join: Join, dash: int) -> None:
-    lanes = 16 if dash % 2 else 1
+    lanes = 64 if dash % 2 else 1
     compare(styled_scene(cap, join, dash, seed=6), device, 1.3, lanes=lanes)
 
 

@@ -226,8 +226,8 @@ def _entry_of(handle: str) -> Any:
 
 
 def _library_count(stage: str, function: Any, arguments: tuple[Any, ...]) -> Count:
-    """Return what a scan or a sort does on a GPU, where both are CUB's: a pass over the numbers; a pass for the
-    digits' histograms, and one for each digit of 8 bits.
+    """Return what a scan or a sort does on a GPU, where both are CUB's: a pass over the numbers; a pass for
+    the digits' histograms, and one for each digit of 8 bits.
     """
     if function is wp.utils.array_scan:
         size = 4 * arguments[0].shape[0]

@@ -20,7 +20,7 @@ from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Capacity, Renderer
-from warpsplat.rendering.tiles import TILE, to_tiles
+from warpsplat.rendering.tiles import TILE, read_tiles, to_tiles, write_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, Scene
 
 GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
@@ -140,13 +140,14 @@ class Measure:
         self._tiles = self._near.tiles
         goal = to_tiles(target)
         self._target = goal[self._tiles]
-        self._inside = self._renderer.film.buffers.inside.numpy()[self._tiles, None]
+        self._inside = read_tiles(self._renderer.film.buffers.inside)[self._tiles, None]
         self._grad = np.zeros_like(goal)
         self._render(points)
         elsewhere = np.ones(len(goal), np.bool_)
         elsewhere[self._tiles] = False
         film = self._renderer.film.buffers
-        rest = (film.image.numpy()[elsewhere] - goal[elsewhere]) * film.inside.numpy()[elsewhere, None]
+        inside = read_tiles(film.inside)[elsewhere, None]
+        rest = (read_tiles(film.image)[elsewhere] - goal[elsewhere]) * inside
         self._rest = float(squares(rest, axis=1).sum(dtype=np.float64))
 
     @property
@@ -171,7 +172,7 @@ class Measure:
         """Return the mean squared error with the outlines at ``points``, and the part around each cubic."""
         self._render(points)
         self._residual = (
-            self._renderer.film.buffers.image.numpy()[self._tiles] - self._target
+            read_tiles(self._renderer.film.buffers.image)[self._tiles] - self._target
         ) * self._inside
         parts = squares(self._residual, axis=1)
         total = self._rest + float(parts.sum(dtype=np.float64))
@@ -268,7 +269,7 @@ class Measure:
             self._renderer.forward()
         self._is_fresh = False
         self._grad[self._tiles] = image_grad
-        self._renderer.film.buffers.image_grad.assign(self._grad)
+        write_tiles(self._renderer.film.buffers.image_grad, self._grad)
         self._renderer.backward()
 
     def _by_image(self, residual: FloatArray) -> FloatArray:

@@ -13,23 +13,22 @@ import warp as wp
 
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels import levels
-from warpsplat.kernels.loss import alpha, image, shape
-from warpsplat.kernels.tile import column
+from warpsplat.kernels.loss import alpha, image, shape, window
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.rendering.tiles import to_tiles
+from warpsplat.rendering.tiles import to_tiles, write_tiles
 from warpsplat.scene import Canvas, FloatArray
 
 
 @dataclass
 class LossBuffers:
-    """Sums that the image losses write, by tile and channel."""
+    """Sums that the image losses write, by tile, channel and lane."""
 
-    loss: wp.array = buffer(wp.float32, "tiles", 3)
+    loss: wp.array = buffer(wp.float32, "tiles", 3, "lanes")
     """Squared errors, unweighted; negative until they have been computed."""
-    similarity: wp.array = buffer(wp.float32, "tiles", 3)
+    similarity: wp.array = buffer(wp.float32, "tiles", 3, "lanes")
     """SSIM x weight."""
 
 
@@ -43,21 +42,20 @@ class LossTarget:
 
         ``importance``: weight of each pixel's error, shape (height, width), mean 1; default: all equal.
         """
-        self.target: wp.array = wp.array(to_tiles(target), dtype=column, device=backend.device)
+        self.target: wp.array = backend.columns_of(to_tiles(target))
         self.weighted = importance is not None
         weights = np.ones(target.shape[:2], np.float32) if importance is None else importance
-        self.importance: wp.array = wp.array(
-            to_tiles(weights[..., None])[:, 0], dtype=column, device=backend.device
-        )
+        self.importance: wp.array = backend.columns_of(to_tiles(weights[..., None])[:, 0])
         self.changed = False
         """Whether ``assign`` has replaced the first target."""
-        self.buffers = backend.allocate(LossBuffers, {"tiles": viewport.tile_count})
+        sizes = {"tiles": viewport.tile_count, "lanes": backend.lanes}
+        self.buffers = backend.allocate(LossBuffers, sizes)
         self.buffers.loss.fill_(-1.0)
         self.value_count = 3 * viewport.pixel_count
 
     def assign(self, target: FloatArray) -> None:
         """Replace the target by another one of the same shape."""
-        self.target.assign(to_tiles(target))
+        write_tiles(self.target, to_tiles(target))
         self.buffers.loss.fill_(-1.0)
         self.changed = True
 
@@ -96,15 +94,22 @@ class Loss:
 def _launch_image_error(program: Program, inputs: LossInputs, weight: float) -> None:
     """Write the gradient of the squared error and of 1 - SSIM in one kernel, which is bound by memory."""
     renderer, target = inputs.renderer, inputs.target
-    film, viewport = renderer.film, renderer.viewport
+    film, viewport, backend = renderer.film, renderer.viewport, renderer.backend
     arrays = (film.buffers, target, target.buffers)
     cache = renderer.bins.buffers.tile_cache
     if film.planes == 4:
-        program.launch(alpha.alpha_loss, viewport.tile_count, *arrays, tile_cache=cache, split=True)
+        program.launch(
+            alpha.make_alpha_loss(backend.column),
+            (viewport.tile_count, backend.lanes),
+            *arrays,
+            tile_cache=cache,
+            lane_columns=backend.lane_columns,
+            split=True,
+        )
         return
     program.launch(
-        image.image_loss,
-        (viewport.tile_count, 3),
+        image.image_loss if backend.lanes == 1 else window.window_loss,
+        (viewport.tile_count, 3, backend.lanes),
         *arrays,
         viewport,
         tile_cache=cache,

@@ -22,6 +22,7 @@ from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import FloatArray
 
 
@@ -163,8 +164,9 @@ class Step:
 
     def square_error(self) -> float:
         """Return the mean squared error of the last render against the loss target. Reads the render back."""
-        difference = self.renderer.film.buffers.image.numpy() - self.loss_target.target.numpy()
-        errors = squares(difference, axis=1) * self.renderer.film.buffers.inside.numpy()
+        film = self.renderer.film.buffers
+        difference = read_tiles(film.image) - read_tiles(self.loss_target.target)
+        errors = squares(difference, axis=1) * read_tiles(film.inside)
         return float(errors.sum(dtype="float64")) / self.loss_target.value_count
 
     def measured_error(self) -> float:
@@ -177,7 +179,7 @@ class Step:
 
         On a transparent canvas, the mean of the residuals on black and on white. Copies both to the host.
         """
-        residual = self.loss_target.target.numpy() - self.renderer.film.buffers.image.numpy()
+        residual = read_tiles(self.loss_target.target) - read_tiles(self.renderer.film.buffers.image)
         if residual.shape[1] == 4:
             residual = residual[:, :3] - 0.5 * residual[:, 3:]
         return np.asarray(residual, np.float32)
@@ -186,7 +188,7 @@ class Step:
         """Return the weight of each pixel's error, 0 outside the image, shape (tile, TILE, TILE)."""
         target = self.loss_target
         weights = target.importance if target.weighted else self.renderer.film.buffers.inside
-        return np.asarray(weights.numpy(), np.float32)
+        return read_tiles(weights)
 
     def psnr(self) -> float:
         """Return the PSNR of the last step's loss, at its size [dB]: that of the render, or once the file has

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-import warp as wp
-
 from warpsplat.kernels import constants
 from warpsplat.paper.grid import Grid
 from warpsplat.paper.kernels import splat_coverage
@@ -18,11 +14,8 @@ class SplatCoverage:
     """The paper's Gaussians: 1 - product of 1 - g."""
 
     mapping = constants.PRODUCT
-    kernels: ClassVar[tuple[wp.Kernel, wp.Kernel]] = (
-        splat_coverage.splat_forward,
-        splat_coverage.splat_backward,
-    )
-    """Gaussians -> coverages, and its adjoint."""
+    is_soft = False
+    """Whether opacities are inside the product."""
 
     def __init__(self, inputs: StageInputs, grid: Grid) -> None:
         self._inputs, self._grid = inputs, grid
@@ -31,11 +24,12 @@ class SplatCoverage:
 
     def states(self, program: Program) -> None:
         """See ``Coverage``."""
+        backend = self._inputs.backend
         program.launch(
-            self.kernels[0],
-            (self._inputs.slots, self._inputs.backend.lanes),
+            splat_coverage.make_forward(backend.column, soft=self.is_soft),
+            (self._inputs.slots, backend.lanes),
             *self._sources,
-            lanes=self._inputs.backend.lanes,
+            lanes=backend.lanes,
             split=True,
         )
 
@@ -45,7 +39,7 @@ class SplatCoverage:
     def backward(self, program: Program) -> None:
         """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
         program.launch(
-            self.kernels[1],
+            splat_coverage.make_backward(self._inputs.backend.column, soft=self.is_soft),
             self._grid.buffers.mean.shape[0],
             *self._sources,
             sum_grad=self.buffers.coverage,
@@ -57,4 +51,4 @@ class SplatCoverage:
 class GaussianCoverage(SplatCoverage):
     """1 - product of 1 - o g."""
 
-    kernels = (splat_coverage.soft_forward, splat_coverage.soft_backward)
+    is_soft = True

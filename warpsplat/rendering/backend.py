@@ -12,15 +12,20 @@ import numpy as np
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.tile import quad, tile_column
 from warpsplat.native import available_cores
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.tiles import tile_counts
+from warpsplat.scene import FloatArray
 
 Buffers = TypeVar("Buffers")
 
 LARGE = 1 << 20
 """Bytes of a CPU array from on which it takes zeroed pages from the system, each when it is first used: many
 arrays are larger than a scene needs, and clearing them took a third of the time of a drawing's renders."""
+
+GPU_LANES = constants.TILE_PIXELS // constants.QUAD
+"""Threads a tile on a GPU."""
 
 THREADS_PER_CORE = 8
 """Most threads that a split launch is cut for: more only wait, and cost memory for pieces and stacks."""
@@ -66,7 +71,8 @@ class Backend:
     threads: int
     """CPU threads that share a launch; 1 on a GPU."""
     lanes: int
-    """Threads a tile: a GPU gives each row or column one; a CPU keeps a tile in one thread's cache."""
+    """Threads a tile, 1 or GPU_LANES: a CPU keeps a tile in one thread's cache; a GPU's threads have a vector
+    of QUAD pixels each, so that they need few registers and neighbours read neighbouring memory."""
 
     @staticmethod
     def on(device: wp.Device | str | None = None, threads: int | None = None) -> Backend:
@@ -78,12 +84,27 @@ class Backend:
         if chosen.is_cpu:
             cores = available_cores()
             return Backend(chosen, max(1, min(threads or cores, THREADS_PER_CORE * cores)), 1)
-        return Backend(chosen, 1, constants.TILE)
+        return Backend(chosen, 1, GPU_LANES)
 
     @property
-    def lane_size(self) -> int:
-        """Rows or columns of a tile that a lane handles."""
-        return constants.TILE // self.lanes
+    def column(self) -> Any:
+        """Type of the vectors of pixels that kernels are made for; see ``kernels.tile``."""
+        return tile_column if self.lanes == 1 else quad
+
+    @property
+    def columns(self) -> int:
+        """Vectors of pixels in a tile."""
+        return int(constants.TILE_PIXELS // self.column._length_)
+
+    @property
+    def lane_columns(self) -> int:
+        """Vectors of a tile that a lane handles."""
+        return self.columns // self.lanes
+
+    @property
+    def row_lanes(self) -> int:
+        """Threads a tile in kernels that go by rows of pixels: one, or one a row."""
+        return min(self.lanes, constants.TILE)
 
     def program(self, stage: str = "") -> Program:
         """An empty program for this backend."""
@@ -103,16 +124,23 @@ class Backend:
             deleter=functools.partial(_release, memory),
         )
 
+    def columns_of(self, tiles: FloatArray) -> wp.array:
+        """Return a copy of tiles, shape (..., TILE, TILE), on the device as vectors, shape (..., columns)."""
+        values = tiles.reshape(*tiles.shape[:-2], self.columns, -1)
+        return wp.array(values, dtype=self.column, device=self.device)
+
     def allocate(self, buffers: type[Buffers], sizes: Mapping[str, int]) -> Buffers:
         """Allocate zeroed arrays for all fields of a dataclass made of ``buffer`` fields.
 
         Args:
             buffers: the dataclass.
-            sizes: what the names of dimensions stand for.
+            sizes: what the names of dimensions stand for, besides "columns".
         """
+        sizes = {"columns": self.columns, **sizes}
         arrays: dict[str, wp.array] = {}
         for item in fields(buffers):  # type: ignore[arg-type]
             dtype, dimensions, memory = (item.metadata[key] for key in ("dtype", "dimensions", "memory_of"))
+            dtype = dtype or self.column
             shape = tuple(sizes[d] if isinstance(d, str) else d for d in dimensions)
             arrays[item.name] = view(arrays[memory], dtype, shape) if memory else self.array(dtype, *shape)
         return buffers(**arrays)
@@ -126,8 +154,8 @@ def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:
     """Declare a field of a dataclass of device arrays.
 
     Args:
-        dtype: of the elements.
-        dimensions: numbers, or names that ``Backend.allocate`` is given the sizes of.
+        dtype: of the elements; None: the backend's vectors of pixels, ``Backend.column``.
+        dimensions: numbers, or names that ``Backend.allocate`` is given the sizes of, or "columns".
         memory_of: an earlier field whose memory this one reads as another type.
     """
     return field(metadata={"dtype": dtype, "dimensions": dimensions, "memory_of": memory_of})

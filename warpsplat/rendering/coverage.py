@@ -9,7 +9,6 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage import fill
-from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.outline import Outline
@@ -22,7 +21,7 @@ class CoverageBuffers:
     pixels.
     """
 
-    coverage: wp.array = buffer(column, "slots", constants.TILE)
+    coverage: wp.array = buffer(None, "slots", "columns")
     """After the adjoint of compositing, the gradient of the sum that the coverage came from."""
     coverage_pixels: wp.array = buffer(wp.float32, "slots", constants.TILE_PIXELS, memory_of="coverage")
 
@@ -50,7 +49,7 @@ class ExactBuffers(CoverageBuffers):
 
     slot_winding: wp.array = buffer(wp.int32, "fill_slots")
     """Winding number of slots that no edge touches."""
-    slot_near: wp.array = buffer(wp.int32, "stroke_slots", "lanes")
+    slot_near: wp.array = buffer(wp.int32, "stroke_slots", "row_lanes")
     segment: wp.array = buffer(wp.int32, "stroke_slots", constants.TILE_PIXELS)
     """Nearest segment of each pixel."""
 
@@ -67,8 +66,8 @@ class ExactCoverage:
     def __init__(self, inputs: StageInputs, outline: Outline) -> None:
         self._inputs, self._outline = inputs, outline
         self._parts = inputs.parameters.parts
-        slots, lanes = inputs.slots, inputs.backend.lanes
-        sizes = {"slots": slots, "lanes": lanes, "fill_slots": slots, "stroke_slots": 0}
+        slots, lanes = inputs.slots, inputs.backend.row_lanes
+        sizes = {"slots": slots, "row_lanes": lanes, "fill_slots": slots, "stroke_slots": 0}
         if constants.STROKE in self._parts:
             sizes["stroke_slots"] = slots
         self.buffers: CoverageBuffers = inputs.backend.allocate(ExactBuffers, sizes)
@@ -91,8 +90,8 @@ class ExactCoverage:
             if part == constants.STROKE:
                 from warpsplat.kernels.coverage import stroke  # brings kernels that fills do not need
 
-                dim = slots, backend.lanes
-                self._launch(program, part, stroke.stroke_forward, dim, lane_rows=backend.lane_size)
+                kernel = stroke.make_forward(backend.column)
+                self._launch(program, part, kernel, (slots, backend.row_lanes))
             else:
                 self._launch(program, part, fill.fill_states, slots, own_part=part)
 
@@ -101,8 +100,8 @@ class ExactCoverage:
         backend = self._inputs.backend
         for part in self._parts:
             if part != constants.STROKE:
-                dim, rows = (self._inputs.slots, backend.lanes), backend.lane_size
-                self._launch(program, part, fill.fill_forward, dim, own_part=part, lane_rows=rows)
+                kernel = fill.make_forward(backend.column)
+                self._launch(program, part, kernel, (self._inputs.slots, backend.row_lanes), own_part=part)
 
     def backward(self, program: Program) -> None:
         """Record gradients in the coverages' place -> gradients of the points and widths."""

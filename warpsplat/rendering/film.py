@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import composite, composite_backward, constants
-from warpsplat.kernels.tile import column
+from warpsplat.kernels import composite, composite_backward
 from warpsplat.rendering.backend import Backend, Viewport, buffer
 from warpsplat.rendering.bins import Bins
 from warpsplat.rendering.coverage import Coverage
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.program import Program
-from warpsplat.rendering.tiles import to_tiles
+from warpsplat.rendering.tiles import to_tiles, write_tiles
 from warpsplat.scene import Canvas
 
 
@@ -23,12 +22,12 @@ from warpsplat.scene import Canvas
 class FilmBuffers:
     """Images by tiles: [tile, channel, column]."""
 
-    image: wp.array = buffer(column, "tiles", "planes", constants.TILE)
+    image: wp.array = buffer(None, "tiles", "planes", "columns")
     """sRGB in [0, 1]; on a transparent canvas premultiplied, unless straight, and opacity."""
-    image_grad: wp.array = buffer(column, "tiles", "planes", constants.TILE)
-    inside: wp.array = buffer(column, "tiles", constants.TILE)
+    image_grad: wp.array = buffer(None, "tiles", "planes", "columns")
+    inside: wp.array = buffer(None, "tiles", "columns")
     """1 for pixels of the image, 0 for the padding."""
-    hit: wp.array = buffer(column, "straight_tiles", constants.TILE)
+    hit: wp.array = buffer(None, "straight_tiles", "columns")
     """Part of each pixel that shapes lie on, where colours are straight."""
 
 
@@ -62,7 +61,7 @@ class Film:
         sizes = {"tiles": tiles, "planes": self.planes, "straight_tiles": tiles if straight else 1}
         self.buffers = backend.allocate(FilmBuffers, sizes)
         whole = np.ones((viewport.height, viewport.width, 1), np.float32)
-        self.buffers.inside.assign(to_tiles(whole)[:, 0])
+        write_tiles(self.buffers.inside, to_tiles(whole)[:, 0])
 
     def attach(self, bins: Bins, coverage: Coverage, paint: Painting) -> None:
         """Composite the shapes of these stages from now on."""
@@ -70,29 +69,28 @@ class Film:
 
     def _painted(self) -> bool:
         """Return whether there is more than flat paints on a background, which have kernels of their own."""
-        return self._straight or self.planes == 4 or not self._paint.is_flat
+        return self.planes == 4 or not self._paint.is_flat
 
     def _adjoint(self) -> wp.Kernel:
         """Return the adjoint of compositing."""
-        painted = self._painted()
+        column, painted = self._backend.column, self._painted()
         if not (self._straight or self._opaque):
-            return composite_backward.make_backward(painted=painted)
+            return composite_backward.make_backward(column, painted=painted)
         from warpsplat.kernels import composite_opaque  # which fits do not use
 
-        if self._straight:
-            return composite_opaque.straight_backward
-        return composite_opaque.opaque_paint_backward if painted else composite_opaque.opaque_backward
+        return composite_opaque.make_backward(column, painted=painted, straight=self._straight)
 
     def launch(self, program: Program, kernel: wp.Kernel, **values: Any) -> None:
         """Record a kernel that goes through each tile's list."""
         dim = (self._viewport.tile_count, self._backend.lanes)
-        numbers = {"lane_columns": self._backend.lane_size, "background": self._background}
+        numbers = {"lane_columns": self._backend.lane_columns, "background": self._background}
         stages = (self._bins.buffers, self._coverage.buffers, self._paint.buffers)
         program.launch(kernel, dim, self.buffers, *stages, numbers, values, split=True)
 
     def forward(self, program: Program) -> None:
         """Record lists and coverages -> ``image``."""
-        self.launch(program, composite.make_forward(painted=self._painted(), straight=self._straight))
+        column, painted = self._backend.column, self._painted()
+        self.launch(program, composite.make_forward(column, painted=painted, straight=self._straight))
 
     def backward(self, program: Program) -> None:
         """Record ``image_grad`` -> gradients by slot, those of the coverages in their place."""
@@ -100,5 +98,5 @@ class Film:
         values: dict[str, Any] = {"mapping": coverage.mapping, "sum_grad": coverage.buffers.coverage}
         if self._opaque:
             slots = self._bins.buffers.list_slot.shape[0]
-            values["transmittances"] = self._backend.array(column, slots, self._backend.lanes)
+            values["transmittances"] = self._backend.array(self._backend.column, slots, self._backend.lanes)
         self.launch(program, self._adjoint(), **values)

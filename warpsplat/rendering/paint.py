@@ -14,7 +14,6 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint import flat
-from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.pictures import picture_arrays
@@ -26,11 +25,11 @@ from warpsplat.scene import GRADIENTS, Paint
 class PaintBuffers:
     """Arrays that the stage owns."""
 
-    slot_columns: wp.array = buffer(column, "column_slots", 4)
+    slot_columns: wp.array = buffer(None, "column_slots", 4)
     """Gradients of colour (3) and opacity, where one thread handles a tile."""
     slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
     """The same by lane, where several threads share a tile."""
-    paint_columns: wp.array = buffer(column, "paint_slots", 4, constants.TILE)
+    paint_columns: wp.array = buffer(None, "paint_slots", 4, "columns")
     """Colour (3) and opacity of the pixels of slots that are not flat."""
     paint_pixels: wp.array = buffer(
         wp.float32, "paint_slots", 4, constants.TILE_PIXELS, memory_of="paint_columns"
@@ -46,7 +45,7 @@ class Painting:
         self._shape_count = parameters.shape_count
         self.has_gradients = bool(parameters.paints & set(GRADIENTS))
         self._pictures = (
-            picture_arrays(parameters.pictures, inputs.viewport, self._backend.device)
+            picture_arrays(parameters.pictures, inputs.viewport, self._backend)
             if Paint.PICTURE in parameters.paints
             else None
         )
@@ -66,15 +65,15 @@ class Painting:
 
     def forward(self, program: Program) -> None:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
-        kernels = []
+        column, kernels = self._backend.column, []
         if self.has_gradients:
             from warpsplat.kernels.paint import gradient_kernels  # takes long to import
 
-            kernels += gradient_kernels.FORWARD
+            kernels += [gradient_kernels.make_forward(column, case) for case in gradient_kernels.NAMES]
         if self._pictures:
             from warpsplat.kernels.paint import picture
 
-            kernels.append(picture.picture_forward)
+            kernels.append(picture.make_forward(column))
         for kernel in kernels:
             program.launch(
                 kernel,
@@ -82,19 +81,21 @@ class Painting:
                 *self._sources,
                 self._pictures or {},
                 self._gradients,
-                lane_columns=self._backend.lane_size,
+                lane_columns=self._backend.lane_columns,
                 split=True,
             )
 
     def backward(self, program: Program) -> None:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
-        shapes = self._shape_count
+        shapes, column = self._shape_count, self._backend.column
         if self.has_gradients:
             from warpsplat.kernels.paint import gradient_kernels
 
-            for kernel in gradient_kernels.BACKWARD:
+            for case in gradient_kernels.NAMES:
+                kernel = gradient_kernels.make_backward(column, case)
                 program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
-        program.launch(flat.flat_backward, shapes, *self._sources, lanes=self._backend.lanes, split=True)
+        kernel = flat.make_backward(column)
+        program.launch(kernel, shapes, *self._sources, lanes=self._backend.lanes, split=True)
 
 
 def _gradients_in(arrays: Mapping[str, wp.array]) -> dict[str, Any]:

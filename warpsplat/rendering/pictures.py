@@ -9,9 +9,8 @@ import numpy as np
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import column
 from warpsplat.portable.filters import resize_area
-from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray, Picture
 
@@ -21,7 +20,7 @@ CLEAR = 1e-4
 """Opacity below which a colour is unknown."""
 
 
-def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, device: wp.Device) -> dict[str, wp.array]:
+def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, backend: Backend) -> dict[str, wp.array]:
     """Return the arrays of ``kernels.paint.picture``: the tiles of each picture in which it is visible."""
     boxes, tiles = [], []
     for one in pictures:
@@ -31,12 +30,12 @@ def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, device: wp.D
     counts = np.array([len(shown) for shown in tiles], np.int32)
 
     def made(values: Any, dtype: Any) -> wp.array:
-        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device)
+        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=backend.device)
 
     return {
         "picture_first": made(np.cumsum(counts, dtype=np.int32) - counts, wp.int32),
         "picture_tiles": made(np.array(boxes, np.int32), wp.int32),
-        "picture_columns": made(np.concatenate(tiles), column),
+        "picture_columns": backend.columns_of(np.concatenate(tiles)),
     }
 
 

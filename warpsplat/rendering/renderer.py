@@ -10,7 +10,6 @@ import warp as wp
 
 from warpsplat.errors import CapacityError
 from warpsplat.kernels import composite, constants
-from warpsplat.kernels.tile import column
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins, StageInputs
 from warpsplat.rendering.film import Film
@@ -19,7 +18,7 @@ from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.paint import Painting
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
-from warpsplat.rendering.tiles import from_tiles, to_tiles
+from warpsplat.rendering.tiles import from_tiles, read_tiles, to_tiles, write_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.scene.scene import IntArray
@@ -172,7 +171,7 @@ class Renderer:
 
     def write_image_grad(self, gradient: FloatArray) -> None:
         """Set the image's gradient from the host, in the image's shape."""
-        self.film.buffers.image_grad.assign(to_tiles(gradient))
+        write_tiles(self.film.buffers.image_grad, to_tiles(gradient))
 
     def removal_costs(self, target: wp.array, importance: wp.array | None = None) -> FloatArray:
         """Return by how much the mean squared error against ``target`` would grow without each shape.
@@ -185,7 +184,7 @@ class Renderer:
         program = self.backend.program()
         importance = self.film.buffers.inside if importance is None else importance
         values = {"target": target, "importance": importance, "slot_cost": cost}
-        self.film.launch(program, composite.removal_cost, **values)
+        self.film.launch(program, composite.make_removal_cost(self.backend.column), **values)
         program.run()
         shapes = self.bins.buffers.slot_shape.numpy()
         used = shapes >= 0
@@ -200,18 +199,19 @@ class Renderer:
         """Return what is visible of each shape, after ``forward``. Allocates and copies to the host: for use
         between steps.
         """
-        seen = self.backend.array(column, self.capacity.slots, constants.TILE)
+        column = self.backend.column
+        seen = self.backend.array(column, self.capacity.slots, self.backend.columns)
         program = self.backend.program()
-        self.film.launch(program, composite.visibility, seen=seen)
+        self.film.launch(program, composite.make_visibility(column), seen=seen)
         program.run()
-        shapes, shares = self.bins.buffers.slot_shape.numpy(), seen.numpy()
+        shapes, shares = self.bins.buffers.slot_shape.numpy(), read_tiles(seen)
         rows = np.flatnonzero((shapes >= 0) & shares.any(axis=(1, 2)))
         tiles = self.bins.buffers.slot_tile.numpy()
         colored, colors = np.zeros(0, np.intp), np.zeros((0, 3, constants.TILE, constants.TILE), np.float32)
         if self.paint.has_gradients:
             paint = self.parameters.arrays["paint"].numpy()[shapes[rows]]
             colored = np.flatnonzero(np.isin(paint, GRADIENTS))
-            colors = self.paint.buffers.paint_columns.numpy()[rows[colored], :3]
+            colors = read_tiles(self.paint.buffers.paint_columns)[rows[colored], :3]
         return Visible(shapes[rows], tiles[rows], shares[rows], colored, colors)
 
     def grow(self) -> bool:

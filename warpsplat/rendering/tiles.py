@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.scene import FloatArray
@@ -31,3 +32,13 @@ def from_tiles(tiles: FloatArray, width: int, height: int) -> FloatArray:
     channels = tiles.shape[1]
     blocks = tiles.reshape(down, across, channels, TILE, TILE).transpose(0, 4, 1, 3, 2)
     return np.ascontiguousarray(blocks.reshape(down * TILE, across * TILE, channels)[:height, :width])
+
+
+def read_tiles(columns: wp.array) -> FloatArray:
+    """Return an array of vectors of pixels, shape (..., columns), as tiles on the host, (..., TILE, TILE)."""
+    return np.asarray(columns.numpy(), np.float32).reshape(*columns.shape[:-1], TILE, TILE)
+
+
+def write_tiles(columns: wp.array, tiles: FloatArray) -> None:
+    """Assign tiles, shape (..., TILE, TILE), to an array of vectors of pixels, shape (..., columns)."""
+    columns.assign(tiles.reshape(*columns.shape, -1))

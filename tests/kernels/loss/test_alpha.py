@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 import torch
 import warp as wp
 
 from tests.helpers import run
 from warpsplat.alpha import on, squares, straight
-from warpsplat.kernels.loss.alpha import alpha_loss
-from warpsplat.kernels.tile import column
+from warpsplat.kernels.loss.alpha import make_alpha_loss
+from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.tiles import from_tiles, to_tiles
 
 
-def test_loss_and_gradient_on_black_and_on_white(device: str) -> None:
+@pytest.mark.parametrize("lanes", [1, 64])
+def test_loss_and_gradient_on_black_and_on_white(device: str, lanes: int) -> None:
+    backend = replace(Backend.on(device), lanes=lanes)
     rng = np.random.default_rng(0)
     height, width = 20, 37
     image, target = rng.uniform(0, 1, (2, height, width, 4)).astype(np.float32)
     weights = rng.uniform(0.5, 2, (height, width, 1)).astype(np.float32)
     arrays = {
-        name: wp.array(to_tiles(value), dtype=column, device=device)
+        name: backend.columns_of(to_tiles(value))
         for name, value in (("image", image), ("target", target), ("image_grad", 0 * image))
     }
-    arrays["importance"] = wp.array(to_tiles(weights)[:, 0], dtype=column, device=device)
+    arrays["importance"] = backend.columns_of(to_tiles(weights)[:, 0])
     tiles = arrays["image"].shape[0]
     arrays["tile_cache"] = wp.zeros(tiles, dtype=int, device=device)
-    arrays["loss"] = wp.zeros((tiles, 3), dtype=float, device=device)
-    run(alpha_loss, tiles, device, arrays, value_count=3 * height * width)
+    arrays["loss"] = wp.zeros((tiles, 3, lanes), dtype=float, device=device)
+    numbers = {"lane_columns": backend.lane_columns, "value_count": 3 * height * width}
+    run(make_alpha_loss(backend.column), (tiles, lanes), device, arrays, numbers)
 
     u = torch.tensor(image, dtype=torch.float64, requires_grad=True)
     v, w = (torch.tensor(x, dtype=torch.float64) for x in (target, weights))

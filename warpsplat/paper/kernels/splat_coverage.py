@@ -10,10 +10,13 @@ With g_i = exp(-q_i / 2), cut at q > cut_i, there are two models:
 Inside a shape all Gaussians share their colour, so their order does not matter.
 """
 
+import functools
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import column, total
+from warpsplat.kernels.tile import total
 from warpsplat.paper import constants as paper
 
 wp.set_module_options(constants.MODULE_OPTIONS)
@@ -23,25 +26,25 @@ EXPONENT = wp.constant(-0.5 / 256.0)
 
 
 @wp.func
-def rows_of_tile() -> column:
-    """Distance of each row's centre from the top of a tile [px]."""
-    rows = column(0.0)
-    for r in range(constants.TILE):
+def rows_of(column: Any):
+    """Distance of each row's centre from the top of a column of the given one's type [px]."""
+    rows = type(column)(0.0)
+    for r in range(len(column)):
         rows[r] = float(r) + 0.5
     return rows
 
 
 @wp.func
-def gaussian_column(con: wp.vec3, dx: wp.float32, dy: column, c_dy: column, least: column) -> column:
+def gaussian_column(con: wp.vec3, dx: wp.float32, dy: Any, c_dy: Any, least: Any):
     """exp(-q / 2) at offsets (dx, dy) [px] from the mean, 0 beyond the cut.
 
     exp(256 v) = exp(v)^256 with three terms of the series, which is right to 0.04 % where it is least, and
     nothing but vector instructions. ``con`` comes multiplied by EXPONENT, so that q becomes v; ``c_dy`` is
     its third entry times dy, ``least`` the v of the cut.
     """
-    one = column(1.0)
-    v = wp.cw_mul(dy, c_dy + column(2.0 * con[1] * dx)) + column(con[0] * dx * dx)
-    within = wp.min(wp.max(STEEP * (v - least), column(0.0)), one)
+    one = type(dy)(1.0)
+    v = wp.cw_mul(dy, c_dy + type(dy)(2.0 * con[1] * dx)) + type(dy)(con[0] * dx * dx)
+    within = wp.min(wp.max(STEEP * (v - least), type(dy)(0.0)), one)
     e = one + wp.max(v, least)
     e = 0.5 * (wp.cw_mul(e, e) + one)
     e = wp.cw_mul(e, e)
@@ -63,14 +66,21 @@ def column_range(centre: wp.float32, extent: wp.float32, left: wp.int32, right: 
     return wp.vec2i(wp.max(left, first), wp.min(right, last))
 
 
-def make_forward(name: str, *, soft: bool) -> wp.Kernel:
-    """Return the kernel of one model."""
+@functools.cache
+def make_forward(column: Any, *, soft: bool) -> wp.Kernel:
+    """Return the kernel of one model, for vectors of type ``column``."""
+    height = column._length_
+    parts = constants.TILE // height  # of a tile's column, a vector each
 
-    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    @wp.kernel(
+        name="soft_forward" if soft else "splat_forward",
+        module="unique",
+        module_options=constants.MODULE_OPTIONS,
+    )
     def forward(
         # In:
         offset: wp.int32,
-        lanes: wp.int32,  # each takes every lanes-th column
+        lanes: wp.int32,  # threads that share the columns of a row of tiles
         slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
         slot_first: wp.array[wp.int32],  # [shape_count]
         shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
@@ -82,7 +92,7 @@ def make_forward(name: str, *, soft: bool) -> wp.Kernel:
         cut: wp.array[wp.float32],  # [gaussian_capacity] of q
         strength: wp.array[wp.float32],  # [gaussian_capacity] below 1; soft only
         # Out:
-        coverage: wp.array2d[column],  # [slot_capacity, TILE] in [0, 1]
+        coverage: wp.array2d[column],  # [slot_capacity, columns] in [0, 1]
         slot_state: wp.array[wp.int32],  # [slot_capacity] 0, PARTIAL where a Gaussian reaches
     ):
         """One thread a row of tiles of a shape (that of its leftmost slot) and lane."""
@@ -95,21 +105,23 @@ def make_forward(name: str, *, soft: bool) -> wp.Kernel:
         local = slot - slot_first[shape]
         if local % wide != 0:
             return
+        part = lane % parts
+        step = lanes / parts
         left = constants.TILE * shape_tiles[shape, 0]
         right = left + constants.TILE * wide
-        top = float(constants.TILE * (shape_tiles[shape, 1] + local / wide))
+        top = float(constants.TILE * (shape_tiles[shape, 1] + local / wide) + height * part)
         one = column(1.0)
-        rows = rows_of_tile()
-        x = left + lane
+        rows = rows_of(one)
+        x = left + lane / parts
         while x < right:
-            coverage[slot + (x - left) / constants.TILE, (x - left) % constants.TILE] = one
-            x += lanes
+            coverage[slot + (x - left) / constants.TILE, parts * ((x - left) % constants.TILE) + part] = one
+            x += step
         for j in range(gaussian_first[shape], gaussian_last[shape]):
             m = mean[j]
             e = extent[j]
-            if m[1] + e[1] >= top and m[1] - e[1] <= top + float(constants.TILE):
+            if m[1] + e[1] >= top and m[1] - e[1] <= top + float(height):
                 reached = column_range(m[0], e[0], left, right)
-                x = reached[0] + (lane + lanes - reached[0] % lanes) % lanes
+                x = reached[0] + (lane / parts + step - reached[0] % step) % step
                 if x < reached[1]:
                     con = EXPONENT * conic[j]
                     dy = rows + column(top - m[1])
@@ -123,22 +135,30 @@ def make_forward(name: str, *, soft: bool) -> wp.Kernel:
                             g = strength[j] * g
                         else:
                             g = wp.min(g, column(paper.GAUSSIAN_MAX))
-                        k = (x - left) % constants.TILE
+                        k = parts * ((x - left) % constants.TILE) + part
                         coverage[s, k] = wp.cw_mul(coverage[s, k], one - g)
-                        x += lanes
-        x = left + lane
+                        x += step
+        x = left + lane / parts
         while x < right:
             s = slot + (x - left) / constants.TILE
-            coverage[s, (x - left) % constants.TILE] = one - coverage[s, (x - left) % constants.TILE]
-            x += lanes
+            k = parts * ((x - left) % constants.TILE) + part
+            coverage[s, k] = one - coverage[s, k]
+            x += step
 
     return forward
 
 
-def make_backward(name: str, *, soft: bool) -> wp.Kernel:
-    """Return the adjoint of one model."""
+@functools.cache
+def make_backward(column: Any, *, soft: bool) -> wp.Kernel:
+    """Return the adjoint of one model, for vectors of type ``column``."""
+    height = column._length_
+    parts = constants.TILE // height  # of a tile's column, a vector each
 
-    @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
+    @wp.kernel(
+        name="soft_backward" if soft else "splat_backward",
+        module="unique",
+        module_options=constants.MODULE_OPTIONS,
+    )
     def backward(
         # In:
         offset: wp.int32,
@@ -152,7 +172,7 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
         extent: wp.array[wp.vec2],  # [gaussian_capacity]
         cut: wp.array[wp.float32],  # [gaussian_capacity] of q
         strength: wp.array[wp.float32],  # [gaussian_capacity] soft only
-        sum_grad: wp.array2d[column],  # [slot_capacity, TILE] of s, coverage = 1 - exp(-s)
+        sum_grad: wp.array2d[column],  # [slot_capacity, columns] of s, coverage = 1 - exp(-s)
         # Out:
         mean_grad: wp.array[wp.vec2],  # [gaussian_capacity] written
         conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] written
@@ -183,21 +203,22 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
             wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
             left = constants.TILE * shape_tiles[shape, 0]
             reached = column_range(m[0], e[0], left, left + constants.TILE * wide)
-            y_first = wp.max(shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / constants.TILE)
-            y_stop = int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / constants.TILE + 1
+            # Vectors from top to bottom; a tile has ``parts`` of them.
+            y_first = wp.max(parts * shape_tiles[shape, 1], int(wp.clamp(m[1] - e[1], 0.0, 1.0e8)) / height)
+            y_stop = int(wp.clamp(m[1] + e[1], -1.0, 1.0e8)) / height + 1
             one = column(1.0)
             most = column(paper.GAUSSIAN_MAX)
             least = column(EXPONENT * cut[i])
-            rows = rows_of_tile()
+            rows = rows_of(one)
             sum_x = zero
             sum_y = zero
             sum_xx = zero
             sum_xy = zero
             sum_yy = zero
-            for tile_y in range(y_first, wp.min(shape_tiles[shape, 3], y_stop)):
-                dy = rows + column(float(constants.TILE * tile_y) - m[1])
+            for y in range(y_first, wp.min(parts * shape_tiles[shape, 3], y_stop)):
+                dy = rows + column(float(height * y) - m[1])
                 c_dy = (EXPONENT * con[2]) * dy
-                slot_row = start + (tile_y - shape_tiles[shape, 1]) * wide
+                slot_row = start + (y / parts - shape_tiles[shape, 1]) * wide
                 # Moments by row of pixels: few enough to stay in registers.
                 moment0 = zero
                 moment1 = zero
@@ -207,7 +228,7 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
                     if slot_state[s] == constants.PARTIAL:
                         dx = float(x) + 0.5 - m[0]
                         g = gaussian_column(EXPONENT * con, dx, dy, c_dy, least)
-                        p = sum_grad[s, (x - left) % constants.TILE]
+                        p = sum_grad[s, parts * ((x - left) % constants.TILE) + y % parts]
                         if soft:
                             p = wp.cw_div(wp.cw_mul(p, g), one - peak * g)
                         else:
@@ -233,9 +254,3 @@ def make_backward(name: str, *, soft: bool) -> wp.Kernel:
             strength_grad[i] = total(sum_p)
 
     return backward
-
-
-splat_forward = make_forward("splat_forward", soft=False)
-splat_backward = make_backward("splat_backward", soft=False)
-soft_forward = make_forward("soft_forward", soft=True)
-soft_backward = make_backward("soft_backward", soft=True)
