@@ -276,5 +276,7 @@ extern "C" WP_API void warpsplat_trace(traced::Trace* trace) { traced::trace = t
 
 #undef builtin_tid1d
 #undef builtin_tid2d
+#undef builtin_tid3d
 #define builtin_tid1d() wp::linear_tid<wp_linear_tid>(traced::begin(task_index), dim)
 #define builtin_tid2d(x, y) wp::tid(x, y, traced::begin(task_index), dim)
+#define builtin_tid3d(x, y, z) wp::tid(x, y, z, traced::begin(task_index), dim)

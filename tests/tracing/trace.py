@@ -140,6 +140,7 @@ class Tracer:
         trace.order = None if order is None else order.ctypes.data
         _entry(kernel)(ctypes.byref(trace))
         command.launch()
+        assert trace.thread, f"{kernel.key} asks for its thread in a way that trace.h does not know"
         longest = max(trace.longest, trace.loads)
         self.counts.append(
             Count(stage, kernel.key, threads, memory.used(), trace.simple, trace.slow, longest)
