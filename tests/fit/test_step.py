@@ -46,7 +46,7 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
 
 
 NOT_IN_STEPS = {
-    *("removal_cost", "visibility"),
+    *("removal_cost", "visibility", "lane_sums"),
     *("tiles_to_pixels", "pixels_to_tiles"),
     *("opaque_backward", "opaque_paint_backward", "straight_forward", "straight_backward"),
 }

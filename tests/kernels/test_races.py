@@ -32,7 +32,7 @@ THREADS = 2
 LANES = {1: tile_column, GPU_LANES: quad}
 """Threads that share a tile, and the vectors of pixels that their kernels are made for."""
 
-NOT_LAUNCHED: dict[int, set[str]] = {1: {"sum_slots", "sum_lanes"}, GPU_LANES: set()}
+NOT_LAUNCHED: dict[int, set[str]] = {1: {"sum_slots", "sum_lanes", "lane_sums"}, GPU_LANES: set()}
 
 WITHOUT_TORCH = {"tiles_to_pixels", "pixels_to_tiles"} if "torch" in needs.MISSING else set()
 
@@ -52,6 +52,7 @@ def step_results(lanes: int) -> Iterator[Arrays]:
         renderer, groups = step.renderer, step.state.parameters.groups.values()
         arrays = [array.numpy() for group in groups for array in (group.value, group.grad, group.moment2)]
         yield [*arrays, renderer.read_image(), step.removal_costs(), renderer.visible().share]
+        assert np.isfinite(step.psnr())
 
 
 def opaque_results(lanes: int) -> Iterator[Arrays]:
