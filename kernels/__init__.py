@@ -24,11 +24,12 @@ Conventions and glossary, here once:
   row, shapes from the front to the back, so that the slot of a pixel is found by arithmetic. Its **state**
   says whether it is covered (``constants.COVERED``, ``UNCOVERED``), and so whether there is a coverage to
   read; slots that are HIDDEN are on no list.
-* Pixels lie by tiles, and in a tile by **columns**: an image is [tile, channel, column], a coverage [slot,
-  column], each element a vector of the 16 pixels from top to bottom (``tile.column``). Kernels that go pixel
-  by pixel have the same memory as [slot, 16 x column + row].
-* A **lane** is a thread's share of a tile: a CPU gives a thread a whole tile (one lane), a GPU has 16 lanes a
-  tile, each a row or a column.
+* Pixels lie by tiles, and in a tile column by column. A **column** of an array, image [tile, channel,
+  column] or coverage [slot, column], is a vector of pixels from top to bottom: all 16 on a CPU, 4 on a GPU,
+  where a tile so has 64 columns. Kernels are made for a type of column (``tile``). Those that go pixel by
+  pixel have the same memory as [slot, 16 x + y].
+* A **lane** is a thread's share of a tile: a CPU gives a thread a whole tile (one lane), a GPU has 64 lanes a
+  tile, each a column; or 16 (row lanes), each a row of pixels.
 * A **coverage mapping** turns the sum s that a model computes into a coverage: AREA, |s| clamped at 1, or
   PRODUCT, 1 - exp(-s).
 * The **transmittance** of a slot is the part of the light that the slots in front let through.

@@ -34,6 +34,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--device", action="append", default=None, help="Warp devices to test (default: all here)"
     )
     parser.addoption(
+        "--gpu-lanes", action="store_true", help="divide tiles on a CPU as on a GPU, which rounds differently"
+    )
+    parser.addoption(
         "--fit-seed",
         type=int,
         default=0,
@@ -43,11 +46,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Shift the seeds of generators that the package and ``tests.scenes`` make, in this process.
+    """Divide tiles as on a GPU, if asked for. Shift the seeds of generators that the package and
+    ``tests.scenes`` make, in this process.
 
     A test whose bound holds for one series of random numbers only would fail on a machine that rounds
     otherwise; ``--fit-seed`` finds it here.
     """
+    if config.getoption("--gpu-lanes"):
+        from tests.lanes import divide_as_on_gpu  # imports the package
+
+        divide_as_on_gpu(pytest.MonkeyPatch())
     shift = config.getoption("--fit-seed")
     if not shift:
         return
@@ -97,7 +105,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         words = set(needs.words_of(dict(item.callspec.params))) if hasattr(item, "callspec") else set()
         if marked & needs.MISSING or words & needs.ABSENT_WORDS:
             item.add_marker(pytest.mark.skip(reason="needs an extension that is not there"))
-    if config.getoption("--fit-seed"):
+    if config.getoption("--fit-seed") or config.getoption("--gpu-lanes"):
         left_out = [item for item in items if item.get_closest_marker("usual_seed")]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]

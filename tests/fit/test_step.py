@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for, steps_of_all_kinds
+from tests.helpers import relative_error
 from tests.kernels.modules import all_kernels
-from tests.scenes import mixed_scene
+from tests.lanes import divide_as_on_gpu
+from tests.scenes import mixed_scene, with_gradients
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import evaluate_file
@@ -16,7 +20,7 @@ from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.rendering.tiles import from_tiles
-from warpsplat.scene import FloatArray, Kind, Scene
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 
 
@@ -56,16 +60,45 @@ SEVERAL_LANES = {"sum_slots", "sum_lanes"}
 """Kernels for tiles that several threads share."""
 
 
-def test_every_kernel_is_in_a_captured_step(device: str) -> None:
+@pytest.mark.parametrize("gpu_lanes", [False, True])
+def test_every_kernel_is_in_a_captured_step(
+    device: str, gpu_lanes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All that the package has, found by walking it: a graph can hold it, and something launches it."""
+    if gpu_lanes:
+        divide_as_on_gpu(monkeypatch)
     launched = set()
-    backend = Backend.on(device)
     for step in steps_of_all_kinds(device):
         assert step._graph is not None
         launched |= {launch.name for program in step.programs for launch in program.launches}
+    backend = Backend.on(device)
     every = {kernel.key for kernel in all_kernels(backend.column)}
     assert every - launched == NOT_IN_STEPS | (SEVERAL_LANES if backend.lanes == 1 else set())
     assert launched - every == {"array_scan", "radix_sort_pairs"}
+
+
+@pytest.mark.parametrize("planes", [3, 4])
+def test_a_step_is_the_same_with_the_lanes_of_a_gpu(
+    device: str, planes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loss, gradients with weighted SSIM, and what densification reads back, but for rounding."""
+    rng = np.random.default_rng(0)
+    target = rng.uniform(size=(41, 59, planes)).astype(np.float32)
+    scene = with_gradients(mixed_scene(59, 41))
+    scene = replace(scene, canvas=Canvas(59, 41, None)) if planes == 4 else scene
+    weights = rng.uniform(0.5, 1.5, (41, 59)).astype(np.float32)
+    settings, found = make_settings(ssim=0.1, iterations=50), []
+    for gpu_lanes in (False, True):
+        if gpu_lanes:
+            divide_as_on_gpu(monkeypatch)
+        step = step_for(scene, target, device, settings, weights=weights)
+        step.advance()
+        gradients = step.renderer.parameters.gradients()
+        visible = step.renderer.visible()
+        read = (step.removal_costs(), step.residual(), step.weights(), visible.share, visible.color)
+        found.append([np.array(step.square_error()), np.array(step.psnr()), *gradients.values(), *read])
+    for one, many in zip(*found, strict=True):
+        assert relative_error(many, one) < 1e-4
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])

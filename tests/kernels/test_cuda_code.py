@@ -1,52 +1,81 @@
-"""The CUDA code of every kernel, compiled without a GPU: Warp brings the compiler along."""
+"""The CUDA code of every kernel, without a GPU: it compiles, and needs few registers."""
 
 from __future__ import annotations
 
-import os
 import re
 import sys
-from pathlib import Path
 
 import pytest
-import warp as wp
 
+from tests.cuda_report import (
+    ARCHITECTURES,
+    Usage,
+    assemble,
+    assembler,
+    gpu_modules,
+    ptx_of,
+    usages,
+    usages_of,
+)
 from tests.kernels import racing
 from tests.kernels.modules import all_kernels
 from warpsplat.kernels.tile import quad
 
-ARCHITECTURE = 75
+pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="Warp for macOS has no CUDA compiler")
+
+MODULES = gpu_modules()
+
+MOST_REGISTERS = 128
+"""Of a thread: a multiprocessor then runs two blocks of 256 threads."""
+
+EXCEPTIONS = dict.fromkeys(("chain_backward", "ramp_backward", "walk_strokes"), 168)
+"""Kernels that only gradients and styled strokes need, with the registers that they may take."""
 
 ATOMIC_FLOATS = re.compile(r"\b(atom|red)\.\S*\.b?f(16|32|64)")
 
-MODULES = {kernel.module.name: kernel.module for kernel in all_kernels(quad)}
+
+def beyond_budget(used: dict[str, Usage]) -> list[str]:
+    """Return the kernels that take too many registers, or keep some in memory."""
+    return [
+        f"{name}: {usage.registers} registers, {usage.spilled} bytes spilled"
+        for name, usage in used.items()
+        if usage.spilled or usage.registers > EXCEPTIONS.get(name, MOST_REGISTERS)
+    ]
 
 
-def cuda_code(module: wp.Module, scratch: Path) -> str:
-    """PTX of a module, compiled where the kernel cache has none of the same kernels, options and Warp."""
-    wp.init()  # which chooses the cache
-    assert wp.config.kernel_cache_dir
-    digest = module.get_module_hash().hex()
-    kept = Path(wp.config.kernel_cache_dir) / "warpsplat-tests-cuda" / f"{digest}.sm{ARCHITECTURE}.ptx"
-    if not kept.exists():
-        wp.compile_aot_module(module, arch=ARCHITECTURE, module_dir=scratch, use_ptx=True)
-        (made,) = scratch.glob("*.ptx")
-        kept.parent.mkdir(exist_ok=True)
-        part = kept.with_suffix(f".{os.getpid()}")
-        part.write_text(made.read_text())
-        part.replace(kept)  # whole or not at all
-    return kept.read_text()
-
-
-@pytest.mark.skipif(sys.platform == "darwin", reason="Warp for macOS has no CUDA compiler")
 @pytest.mark.parametrize("name", MODULES)
-def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
-    text = cuda_code(MODULES[name], tmp_path)
-    for kernel in all_kernels(quad):
-        if kernel.module.name == name:
-            assert f".entry {kernel.key}_" in text
+def test_kernels_compile_for_cuda_and_need_few_registers(name: str) -> None:
+    text = ptx_of(MODULES[name]).read_text()
+    keys = {kernel.key for kernel in all_kernels(quad) if kernel.module.name == name}
+    for key in keys:
+        assert f".entry {key}_" in text
     assert not ATOMIC_FLOATS.search(text), "results would depend on the order of threads"
+    if not assembler():
+        pytest.skip("compiled, but there is no ptxas to count registers")
+    for architecture, used in usages_of([MODULES[name]]).items():
+        assert used.keys() >= keys
+        assert not beyond_budget(used), f"sm_{architecture}"
 
 
-@pytest.mark.skipif(sys.platform == "darwin", reason="Warp for macOS has no CUDA compiler")
-def test_atomic_sums_of_floats_are_found(tmp_path: Path) -> None:
-    assert ATOMIC_FLOATS.search(cuda_code(racing.adds_up.module, tmp_path))
+@pytest.mark.skipif(not assembler(), reason="no ptxas")
+def test_a_kernel_that_spills_is_found() -> None:
+    (module,) = (module for name, module in MODULES.items() if name.startswith("composite_backward"))
+    report = assemble(ptx_of(module), ARCHITECTURES[-1], "--maxrregcount=32")
+    (problem,) = beyond_budget(usages(report))
+    assert "composite_backward: 32 registers" in problem
+
+
+def test_atomic_sums_of_floats_are_found() -> None:
+    assert ATOMIC_FLOATS.search(ptx_of(racing.adds_up.module).read_text())
+
+
+def test_exceptions_exist() -> None:
+    assert EXCEPTIONS.keys() <= {kernel.key for kernel in all_kernels(quad)}
+
+
+@pytest.mark.parametrize(
+    ("registers", "shared", "occupancy"),
+    [(32, 0, 1.0), (33, 0, 0.75), (128, 0, 0.25), (255, 0, 0.125), (32, 100 << 10, 0.25)],
+)
+def test_occupancy(registers: int, shared: int, occupancy: float) -> None:
+    assert Usage(registers, 0, 0, shared).occupancy(90, 256) == occupancy

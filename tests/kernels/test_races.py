@@ -18,6 +18,7 @@ from tests.fit.pictures import step_for, steps_of_all_kinds
 from tests.helpers import renderer_for
 from tests.kernels import racing
 from tests.kernels.modules import all_kernels
+from tests.lanes import divide_as_on_gpu
 from tests.scenes import mixed_scene, with_gradients
 from tests.tracing.trace import KINDS, Race, Tracer, tracing
 from warpsplat.fit.settings import make_settings
@@ -45,9 +46,9 @@ shape that are not finite, and the lanes of a tile that Gaussians reach."""
 Arrays = list[np.ndarray]
 
 
-def step_results(lanes: int) -> Iterator[Arrays]:
+def step_results() -> Iterator[Arrays]:
     """Make a step of each kind, and what is launched between steps; yield the results."""
-    for step in steps_of_all_kinds("cpu", THREADS, lanes):
+    for step in steps_of_all_kinds("cpu", THREADS):
         step.advance()
         renderer, groups = step.renderer, step.state.parameters.groups.values()
         arrays = [array.numpy() for group in groups for array in (group.value, group.grad, group.moment2)]
@@ -55,12 +56,12 @@ def step_results(lanes: int) -> Iterator[Arrays]:
         assert np.isfinite(step.psnr())
 
 
-def opaque_results(lanes: int) -> Iterator[Arrays]:
+def opaque_results() -> Iterator[Arrays]:
     """Render opaque shapes; yield gradients."""
     plain = mixed_scene(seed=1)
     painted = replace(with_gradients(mixed_scene(seed=2)), canvas=Canvas(40, 36, None))
     for scene, straight in ((plain, False), (painted, False), (painted, True)):
-        renderer = renderer_for(scene, "cpu", threads=THREADS, lanes=lanes, opaque=True, straight=straight)
+        renderer = renderer_for(scene, "cpu", threads=THREADS, opaque=True, straight=straight)
         renderer.write_image_grad(np.random.default_rng(0).normal(size=renderer.read_image().shape))
         renderer.backward()
         yield [renderer.read_image(), *renderer.parameters.gradients().values()]
@@ -79,10 +80,10 @@ def torch_results() -> Iterator[Arrays]:
     yield [image.detach().numpy(), *(v.grad.numpy() for v in tensors.values.values() if v.grad is not None)]
 
 
-def results(lanes: int, tracer: Tracer) -> list[Arrays]:
+def results(tracer: Tracer) -> list[Arrays]:
     """Launch every kernel; return what comes out."""
     with tracing(tracer):
-        found = [*step_results(lanes), *opaque_results(lanes)]
+        found = [*step_results(), *opaque_results()]
         if "torch" not in needs.MISSING:
             found += torch_results()
     return found
@@ -95,10 +96,12 @@ def unexpected(races: list[Race]) -> list[Race]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lanes", LANES)
-def test_no_two_threads_meet(lanes: int) -> None:
+def test_no_two_threads_meet(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the order in which they run, the bits are the same."""
+    if lanes == GPU_LANES:
+        divide_as_on_gpu(monkeypatch)
     usual, shuffled = Tracer(), Tracer(np.random.default_rng(lanes))
-    for one, other in zip(results(lanes, usual), results(lanes, shuffled), strict=True):
+    for one, other in zip(results(usual), results(shuffled), strict=True):
         for array, again in zip(one, other, strict=True):
             np.testing.assert_array_equal(array, again)
     for tracer in (usual, shuffled):

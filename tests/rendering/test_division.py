@@ -64,7 +64,7 @@ def outcome(case: str, device: str, **division: int) -> list[np.ndarray]:
 
 
 @by_case
-def test_many_lanes_do_what_one_does(device: str, case: str) -> None:
+def test_the_lanes_of_a_gpu_do_what_one_does(device: str, case: str) -> None:
     """A GPU's vectors of pixels are shorter than a CPU's."""
     both = (outcome(case, device, lanes=lanes) for lanes in (1, GPU_LANES))
     for one, many in zip(*both, strict=True):

@@ -26,7 +26,7 @@ from warpsplat.scene.scene import IntArray
 GROWTH = 1.5
 """Capacity over need when an array has to grow, so that a growing scene seldom does."""
 SLOT_LIMIT = 1_500_000
-"""Most slots (1.3 KiB each, 2.4 for strokes) before a scene is refused: up to 3.5 GiB."""
+"""Most slots before a scene is refused: 1.3 KiB each, 2.4 for strokes, and 1 more on a GPU; up to 5 GiB."""
 SAMPLE_LIMIT = 16_000_000
 """Most Gaussians or vertices (about 120 bytes each, 200 with styled strokes) before a scene is refused."""
 SLOTS_PER_SHAPE = 8
