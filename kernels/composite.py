@@ -59,9 +59,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
         paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] colour and opacity of each pixel
         background: wp.vec3,
         # Out:
-        image: wp.array3d[
-            column
-        ],  # [tile_count, planes, columns] colour, and opacity of a transparent canvas
+        image: wp.array3d[column],  # [tile_count, planes, columns] colour, and opacity if transparent
         hit: wp.array2d[column],  # [tile_count, columns] part of a pixel that shapes lie on; straight only
     ):
         """One thread a tile and lane. Cached tiles stay as they are."""

@@ -82,9 +82,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
         # Out:
         transmittances: wp.array2d[column],  # [slot_capacity, lanes] by place in the lists; scratch
         paint_columns: wp.array3d[column],  # [paint_slots, 4, columns] replaced by their gradients
-        sum_grad: wp.array2d[
-            column
-        ],  # [slot_capacity, columns] of s, visible PARTIAL slots; coverage's memory
+        sum_grad: wp.array2d[column],  # [slot_capacity, columns] of visible PARTIAL slots; coverage's memory
         slot_columns: wp.array2d[column],  # [slot_capacity, 4] of colour (3), opacity by pixel row: one lane
         slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the same, summed up: several lanes
     ):

@@ -162,8 +162,8 @@ def case_of(g: Gradients, shape: wp.int32) -> wp.int32:
 
 
 @wp.func
-def pixel_place(tile: wp.int32, tiles_x: wp.int32, pixel: wp.int32, scale: wp.float32) -> wp.vec2:
-    """Return the centre of a tile's pixel, by its place in memory, canvas units."""
-    px = float(constants.TILE * (tile % tiles_x) + pixel / constants.TILE) + 0.5
-    py = float(constants.TILE * (tile / tiles_x) + pixel % constants.TILE) + 0.5
+def pixel_place(tile: wp.int32, tiles_x: wp.int32, x: wp.int32, y: wp.int32, scale: wp.float32) -> wp.vec2:
+    """Return the centre of a tile's pixel, canvas units."""
+    px = float(constants.TILE * (tile % tiles_x) + x) + 0.5
+    py = float(constants.TILE * (tile / tiles_x) + y) + 0.5
     return wp.vec2(px / scale, py / scale)

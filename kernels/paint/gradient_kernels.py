@@ -115,6 +115,7 @@ NAMES = {RAMP: "ramp", CHAIN: "chain", GENERAL: "gradient"}
 def make_forward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
     """Return the kernel of RAMP, CHAIN or GENERAL gradients, in vectors of type ``column``."""
     height = column._length_
+    parts = constants.TILE // height  # of a tile's column, a vector each
 
     @wp.kernel(name=f"{NAMES[case]}_forward", module="unique", module_options=constants.MODULE_OPTIONS)
     def forward(
@@ -159,18 +160,23 @@ def make_forward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
         row = rows(column(0.0))
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
             if case == GENERAL:
-                for p in range(height * x, height * (x + 1)):
-                    place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, p, scale))
+                for y in range(height):
+                    place = to_unit(
+                        f, pixel_place(slot_tile[slot], tiles_x, x / parts, height * (x % parts) + y, scale)
+                    )
                     t = spread_out(own_spread, parameter(own_paint, own_focus, place)[0])
                     at = between_stops(g.stop_offsets, first, last, t[0])
                     color = (1.0 - at.share) * g.stop_colors[at.low] + at.share * g.stop_colors[at.high]
+                    p = height * x + y
                     for channel in range(3):
                         paint_pixels[slot, channel, p] = color[channel]
                     opacity = g.stop_opacities[at.low]
                     opacity += at.share * (g.stop_opacities[at.high] - opacity)
                     paint_pixels[slot, 3, p] = opacity
             else:
-                top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, height * x, scale))
+                top = to_unit(
+                    f, pixel_place(slot_tile[slot], tiles_x, x / parts, height * (x % parts), scale)
+                )
                 ts = column(top[0]) + down[0] * row
                 if own_paint != constants.LINEAR:
                     v = column(top[1]) + down[1] * row
@@ -307,7 +313,9 @@ def gradient_backward(
             for p in range(constants.TILE * constants.TILE):
                 color = wp.vec3(paint_pixels[slot, 0, p], paint_pixels[slot, 1, p], paint_pixels[slot, 2, p])
                 opacity = paint_pixels[slot, 3, p]
-                place = to_unit(f, pixel_place(slot_tile[slot], tiles_x, p, scale))
+                place = to_unit(
+                    f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
+                )
                 raw = parameter(paint[shape], focus[shape], place)
                 t = spread_out(spread[shape], raw[0])
                 at = between_stops(stop_offsets, first, last, t[0])
@@ -337,6 +345,7 @@ def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
     if case == GENERAL:
         return gradient_backward
     height = column._length_
+    parts = constants.TILE // height  # of a tile's column, a vector each
 
     @wp.kernel(name=f"{NAMES[case]}_backward", module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
@@ -399,12 +408,14 @@ def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
         u_by_v = zero
         v_by_u = zero
         v_by_v = zero
-        columns = int(constants.TILE_PIXELS // height)  # not unrolled, which takes long to compile
+        columns = int(constants.TILE * parts)  # not unrolled, which takes long to compile
         for slot in range(slot_first[shape], slot_last[shape]):
             state = slot_state[slot]
             if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
                 for x in range(columns):
-                    top = to_unit(f, pixel_place(slot_tile[slot], tiles_x, height * x, scale))
+                    top = to_unit(
+                        f, pixel_place(slot_tile[slot], tiles_x, x / parts, height * (x % parts), scale)
+                    )
                     u = column(top[0]) + down[0] * row
                     v = column(top[1]) + down[1] * row
                     t = u
