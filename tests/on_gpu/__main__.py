@@ -111,6 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.part:
         run_part(*options.part)
         return 0
+    # That of the suite, so that nothing is compiled twice.
+    os.environ.setdefault("WARP_CACHE_PATH", str(Path(tempfile.gettempdir(), "warpsplat-test-kernels")))
     folder = options.pictures or next(folder for folder in PHOTOGRAPHS if folder.exists())
     pictures = pictures_in(folder, options.count)
     plan = Plan(options.device, pictures, **(SMALL if options.small else {}))
