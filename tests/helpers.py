@@ -36,12 +36,14 @@ def renderer_for(
     lanes: int | None = None,
     capacity: Capacity | None = None,
     opaque: bool = False,
+    straight: bool = False,
 ) -> Renderer:
     """Return a renderer after a complete forward pass. ``lanes``: default: as usual on the device."""
     backend = Backend.on(device, threads)
     backend = replace(backend, lanes=lanes or backend.lanes)
     viewport = Viewport(round(scene.canvas.width * scale), round(scene.canvas.height * scale), scale)
-    renderer = Renderer(Parameters(scene, backend), viewport, model=model, capacity=capacity, opaque=opaque)
+    options = {"model": model, "capacity": capacity, "opaque": opaque, "straight": straight}
+    renderer = Renderer(Parameters(scene, backend), viewport, **options)
     renderer.forward_complete()
     return renderer
 

@@ -5,13 +5,12 @@ it reflects, and its colour times the image's gradient. Gradients (``gradient``)
 by pixel.
 """
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.tile import total
+from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -43,70 +42,86 @@ def paint_against(paint: wp.vec4, red: Any, green: Any, blue: Any):
     return paint[0] * red + paint[1] * green + paint[2] * blue
 
 
+@wp.func
+def is_visible(state: wp.int32) -> wp.bool:
+    """Return whether a slot in this state has gradients."""
+    return state & constants.COVERED != 0 and state & constants.HIDDEN == 0
+
+
+@wp.kernel(module="unique", module_options=constants.MODULE_OPTIONS)
+def flat_backward(
+    # In:
+    offset: wp.int32,
+    paint: wp.array[wp.int32],  # [shape_count]
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    slot_columns: wp.array2d[tile_column],  # [slot_capacity, 4]
+    # Out:
+    colors_grad: wp.array[wp.vec3],  # [shape_count] written
+    opacities_grad: wp.array[wp.float32],  # [shape_count] written
+):
+    """Sum over a shape's visible slots in a fixed order, where a tile has one lane: the same bits on every
+    run. One thread a shape.
+    """
+    shape = offset + wp.tid()
+    red = tile_column(0.0)
+    green = tile_column(0.0)
+    blue = tile_column(0.0)
+    opacity = tile_column(0.0)
+    for slot in range(slot_first[shape], slot_last[shape]):
+        if is_visible(slot_state[slot]):
+            red = red + slot_columns[slot, 0]
+            green = green + slot_columns[slot, 1]
+            blue = blue + slot_columns[slot, 2]
+            opacity = opacity + slot_columns[slot, 3]
+    if paint[shape] != constants.FLAT:
+        red = tile_column(0.0)
+        green = tile_column(0.0)
+        blue = tile_column(0.0)
+    colors_grad[shape] = wp.vec3(total(red), total(green), total(blue))
+    opacities_grad[shape] = total(opacity)
+
+
+@wp.kernel
+def sum_slots(
+    # In:
+    offset: wp.int32,
+    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
+    # Out:
+    lane_grad: wp.array2d[wp.vec4],  # [shape_count, lanes]
+):
+    """Sum over a shape's visible slots in a fixed order, where a tile has several lanes. One thread a shape
+    and lane: a thread a shape would wait for thousands of loads, one after the other.
+    """
+    i, lane = wp.tid()
+    shape = offset + i
+    sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    for slot in range(slot_first[shape], slot_last[shape]):
+        if is_visible(slot_state[slot]):
+            sums = sums + slot_grad[slot, lane]
+    lane_grad[shape, lane] = sums
+
+
 @wp.kernel
 def sum_lanes(
     # In:
     offset: wp.int32,
-    slot_state: wp.array[wp.int32],  # [slot_capacity]
+    paint: wp.array[wp.int32],  # [shape_count]
+    lane_grad: wp.array2d[wp.vec4],  # [shape_count, lanes]
     # Out:
-    slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] the sum of all in the first one's place
+    colors_grad: wp.array[wp.vec3],  # [shape_count] written
+    opacities_grad: wp.array[wp.float32],  # [shape_count] written
 ):
-    """Sum the gradients of visible slots over the lanes of a GPU. One thread a slot: shapes have so many that
-    a thread a shape would be long.
-    """
-    slot = offset + wp.tid()
-    state = slot_state[slot]
-    if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
-        sums = slot_grad[slot, 0]
-        for lane in range(1, slot_grad.shape[1]):
-            sums = sums + slot_grad[slot, lane]
-        slot_grad[slot, 0] = sums
-
-
-@functools.cache
-def make_backward(column: Any) -> wp.Kernel:
-    """Return the adjoint of flat paints, for vectors of type ``column``."""
-
-    @wp.kernel(name="flat_backward", module="unique", module_options=constants.MODULE_OPTIONS)
-    def flat_backward(
-        # In:
-        offset: wp.int32,
-        lanes: wp.int32,
-        paint: wp.array[wp.int32],  # [shape_count]
-        slot_first: wp.array[wp.int32],  # [shape_count]
-        slot_last: wp.array[wp.int32],  # [shape_count]
-        slot_state: wp.array[wp.int32],  # [slot_capacity]
-        slot_columns: wp.array2d[column],  # [slot_capacity, 4]
-        slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes] see sum_lanes
-        # Out:
-        colors_grad: wp.array[wp.vec3],  # [shape_count] written
-        opacities_grad: wp.array[wp.float32],  # [shape_count] written
-    ):
-        """Sum over a shape's visible slots in a fixed order: the same bits on every run. One thread a
-        shape.
-        """
-        shape = offset + wp.tid()
-        red = column(0.0)
-        green = column(0.0)
-        blue = column(0.0)
-        opacity = column(0.0)
+    """Sum over a shape's lanes. One thread a shape."""
+    shape = offset + wp.tid()
+    sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    for lane in range(lane_grad.shape[1]):
+        sums = sums + lane_grad[shape, lane]
+    opacities_grad[shape] = sums[3]
+    if paint[shape] != constants.FLAT:
         sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        for slot in range(slot_first[shape], slot_last[shape]):
-            state = slot_state[slot]
-            if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
-                if lanes == 1:
-                    red = red + slot_columns[slot, 0]
-                    green = green + slot_columns[slot, 1]
-                    blue = blue + slot_columns[slot, 2]
-                    opacity = opacity + slot_columns[slot, 3]
-                else:
-                    sums = sums + slot_grad[slot, 0]
-        if paint[shape] != constants.FLAT:
-            red = column(0.0)
-            green = column(0.0)
-            blue = column(0.0)
-            sums = wp.vec4(0.0, 0.0, 0.0, sums[3])
-        colors_grad[shape] = wp.vec3(sums[0] + total(red), sums[1] + total(green), sums[2] + total(blue))
-        opacities_grad[shape] = sums[3] + total(opacity)
-
-    return flat_backward
+    colors_grad[shape] = wp.vec3(sums[0], sums[1], sums[2])

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import seam
-from tests.fit.pictures import picture, step_for
+from tests.fit.pictures import picture, step_for, steps_of_all_kinds
 from tests.helpers import relative_error
 from tests.kernels.modules import all_kernels
 from tests.lanes import divide_as_on_gpu
-from tests.scenes import mixed_scene, picture_scene, with_gradients
-from warpsplat.extensions import renderer_names
+from tests.scenes import mixed_scene, with_gradients
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import evaluate_file
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.fit.step import Step
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.rendering.tiles import from_tiles
-from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Paint, Picture, Scene
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 
 
@@ -54,33 +50,14 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
 
 
 NOT_IN_STEPS = {
-    *("removal_cost", "visibility"),
+    *("removal_cost", "visibility", "lane_sums"),
     *("tiles_to_pixels", "pixels_to_tiles"),
     *("opaque_backward", "opaque_paint_backward", "straight_forward", "straight_backward"),
 }
 """Kernels that run between steps, or in passes of ``warpsplat.torch``."""
 
-
-def steps_of_all_kinds(device: str) -> Iterator[Step]:
-    """Yield steps that launch every kernel of a step between them."""
-    for renderer in renderer_names():
-        settings = make_settings(renderer=renderer, iterations=50, xing=0.01)
-        scene = mixed_scene(64, 48, splines=renderer == "exact")
-        yield step_for(scene, picture(), device, settings, threads=1)
-    painted = with_gradients(mixed_scene(64, 48))
-    stroke = int(np.flatnonzero(painted.kind == Kind.STROKE)[0])
-    twins = replace(painted.take(np.array([stroke, stroke])), twin=np.array([0, 1], np.int32))
-    scene = painted.append(twins)
-    scene = replace(scene, cap=np.full(len(scene), Cap.BUTT, np.int32), canvas=Canvas(64, 48, None))
-    kept = Picture("<g/>", (64, 48), (9, 9), np.full((20, 20, 4), 0.5, np.float32))
-    target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)
-    yield step_for(scene.append(picture_scene(scene.canvas, kept)), target, device, threads=1)
-    yield step_for(seam().scene, np.ones((32, 48, 3), np.float32), device, threads=1)
-    circle = np.array([30, 20, 9, 0, 0, 9], np.float32)
-    radial = (painted.paint == Paint.RADIAL)[:, None]
-    layers = np.minimum(np.arange(len(painted)), 1).astype(np.int32)
-    layered = replace(painted, frames=np.where(radial, circle, painted.frames), layer=layers)
-    yield step_for(layered, picture(), device, threads=1)
+SEVERAL_LANES = {"sum_slots", "sum_lanes"}
+"""Kernels for tiles that several threads share."""
 
 
 @pytest.mark.parametrize("gpu_lanes", [False, True])
@@ -96,7 +73,7 @@ def test_every_kernel_is_in_a_captured_step(
         launched |= {launch.name for program in step.programs for launch in program.launches}
     backend = Backend.on(device)
     every = {kernel.key for kernel in all_kernels(backend.column)}
-    assert every - launched == NOT_IN_STEPS | ({"sum_lanes"} if backend.lanes == 1 else set())
+    assert every - launched == NOT_IN_STEPS | (SEVERAL_LANES if backend.lanes == 1 else set())
     assert launched - every == {"array_scan", "radix_sort_pairs"}
 
 

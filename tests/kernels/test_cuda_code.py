@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import pytest
@@ -16,6 +17,7 @@ from tests.cuda_report import (
     usages,
     usages_of,
 )
+from tests.kernels import racing
 from tests.kernels.modules import all_kernels
 from warpsplat.kernels.tile import quad
 
@@ -28,6 +30,8 @@ MOST_REGISTERS = 128
 
 EXCEPTIONS = dict.fromkeys(("chain_backward", "ramp_backward", "walk_strokes"), 168)
 """Kernels that only gradients and styled strokes need, with the registers that they may take."""
+
+ATOMIC_FLOATS = re.compile(r"\b(atom|red)\.\S*\.b?f(16|32|64)")
 
 
 def beyond_budget(used: dict[str, Usage]) -> list[str]:
@@ -45,6 +49,7 @@ def test_kernels_compile_for_cuda_and_need_few_registers(name: str) -> None:
     keys = {kernel.key for kernel in all_kernels(quad) if kernel.module.name == name}
     for key in keys:
         assert f".entry {key}_" in text
+    assert not ATOMIC_FLOATS.search(text), "results would depend on the order of threads"
     if not assembler():
         pytest.skip("compiled, but there is no ptxas to count registers")
     for architecture, used in usages_of([MODULES[name]]).items():
@@ -58,6 +63,10 @@ def test_a_kernel_that_spills_is_found() -> None:
     report = assemble(ptx_of(module), ARCHITECTURES[-1], "--maxrregcount=32")
     (problem,) = beyond_budget(usages(report))
     assert "composite_backward: 32 registers" in problem
+
+
+def test_atomic_sums_of_floats_are_found() -> None:
+    assert ATOMIC_FLOATS.search(ptx_of(racing.adds_up.module).read_text())
 
 
 def test_exceptions_exist() -> None:

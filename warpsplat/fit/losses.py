@@ -42,6 +42,7 @@ class LossTarget:
 
         ``importance``: weight of each pixel's error, shape (height, width), mean 1; default: all equal.
         """
+        self._backend = backend
         self.target: wp.array = backend.columns_of(to_tiles(target))
         self.weighted = importance is not None
         weights = np.ones(target.shape[:2], np.float32) if importance is None else importance
@@ -61,7 +62,7 @@ class LossTarget:
 
     def mean_square(self) -> float:
         """Return the unweighted mean squared error of the last step. Reads a number per tile back."""
-        return float(self.buffers.loss.numpy().sum(dtype="float64")) / self.value_count
+        return float(self._backend.lane_sums(self.buffers.loss).sum(dtype="float64")) / self.value_count
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import warp as wp
 
-from warpsplat.kernels import constants
+from warpsplat.kernels import constants, lanes
 from warpsplat.kernels.tile import quad, tile_column
 from warpsplat.native import available_cores
 from warpsplat.rendering.program import Program
@@ -128,6 +128,22 @@ class Backend:
         """Return a copy of tiles, shape (..., TILE, TILE), on the device as vectors, shape (..., columns)."""
         values = tiles.reshape(*tiles.shape[:-2], self.columns, -1)
         return wp.array(values, dtype=self.column, device=self.device)
+
+    def lane_sums(self, by_lane: wp.array) -> FloatArray:
+        """Return sums over the lanes, the last dimension, on the host. They are summed up where they are: a
+        GPU has so many that copying them would take longer.
+        """
+        shape = by_lane.shape[:-1]
+        sums = by_lane
+        if self.lanes > 1:
+            count = math.prod(shape)
+            sums = self.array(wp.float32, count)
+            program = self.program()
+            program.launch(
+                lanes.lane_sums, count, by_lane=view(by_lane, wp.float32, (count, self.lanes)), sums=sums
+            )
+            program.run()
+        return np.asarray(sums.numpy()).reshape(shape)
 
     def allocate(self, buffers: type[Buffers], sizes: Mapping[str, int]) -> Buffers:
         """Allocate zeroed arrays for all fields of a dataclass made of ``buffer`` fields.

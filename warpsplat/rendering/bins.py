@@ -77,7 +77,8 @@ class Bins:
         ranges = (b.front_slots, b.front_ends, b.slot_first, b.slot_last)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity, reverse=True)
         program.launch(bins.fill_slots, self._capacity, b, self._viewport, split=True)
-        program.call(wp.utils.radix_sort_pairs, b.sort_keys, b.sort_slots, self._capacity)
+        bits = tiles.bit_length()  # in which the keys of unused slots, INT_MAX, are still the largest
+        program.call(wp.utils.radix_sort_pairs, b.sort_keys, b.sort_slots, self._capacity, 0, bits)
         program.launch(bins.clear_ranges, tiles, b)
         program.launch(bins.tile_ranges, self._capacity, b, slot_capacity=self._capacity)
 

@@ -29,6 +29,8 @@ class PaintBuffers:
     """Gradients of colour (3) and opacity, where one thread handles a tile."""
     slot_grad: wp.array = buffer(wp.vec4, "lane_slots", "lanes")
     """The same by lane, where several threads share a tile."""
+    lane_grad: wp.array = buffer(wp.vec4, "lane_shapes", "lanes")
+    """The same by shape and lane."""
     paint_columns: wp.array = buffer(None, "paint_slots", 4, "columns")
     """Colour (3) and opacity of the pixels of slots that are not flat."""
     paint_pixels: wp.array = buffer(
@@ -56,6 +58,7 @@ class Painting:
             {
                 "column_slots": slots if lanes == 1 else 1,
                 "lane_slots": 1 if lanes == 1 else slots,
+                "lane_shapes": 1 if lanes == 1 else self._shape_count,
                 "lanes": lanes,
                 "paint_slots": 1 if self.is_flat else slots,
             },
@@ -94,10 +97,11 @@ class Painting:
             for case in gradient_kernels.NAMES:
                 kernel = gradient_kernels.make_backward(column, case)
                 program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
-        if self._backend.lanes > 1:
-            program.launch(flat.sum_lanes, self._slots, *self._sources, split=True)
-        kernel = flat.make_backward(column)
-        program.launch(kernel, shapes, *self._sources, lanes=self._backend.lanes, split=True)
+        if self._backend.lanes == 1:
+            program.launch(flat.flat_backward, shapes, *self._sources, split=True)
+        else:
+            program.launch(flat.sum_slots, (shapes, self._backend.lanes), *self._sources, split=True)
+            program.launch(flat.sum_lanes, shapes, *self._sources, split=True)
 
 
 def _gradients_in(arrays: Mapping[str, wp.array]) -> dict[str, Any]:

@@ -190,7 +190,7 @@ class Renderer:
         used = shapes >= 0
         totals = np.bincount(
             shapes[used],
-            weights=cost.numpy().sum(axis=1, dtype=np.float64)[used],
+            weights=self.backend.lane_sums(cost)[used],
             minlength=self.parameters.shape_count,
         )
         return np.asarray(totals / (3 * self.viewport.pixel_count), np.float32)

@@ -1,0 +1,120 @@
+"""The command for the day when a GPU is there, tried on the CPU in small; and what a step is counted as."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests import needs, roofline
+from tests.on_gpu import __main__ as on_gpu
+from tests.on_gpu.parts import PARTS, Plan
+from tests.tracing.trace import Count, Memory
+from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.backend import GPU_LANES
+
+pytestmark = needs.WHOLE
+
+QUICK = ("agreement", "bits", "streams", "memory", "quality")
+"""Parts that take a second each in small. ``kernels`` compiles all, ``speed`` most of them."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    noise = np.random.default_rng(0).integers(0, 255, (32, 48, 3), np.uint8)
+    for name in "abcd":
+        Image.fromarray(noise).save(tmp_path / f"{name}.png")
+    (tmp_path / "notes.txt").write_text("no picture")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_parts_pass_on_the_cpu(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--device", "cpu", "--small", "--pictures", str(folder), "--count", "1", "--only", *QUICK]
+    status = on_gpu.main(arguments)
+    text = capsys.readouterr().out
+    assert status == 0, text
+    table = text[text.index("| part |") :]
+    assert {line.split("|")[1].strip() for line in table.splitlines()[2:] if line.startswith("|")} == {*QUICK}
+    assert "0 of " in table.splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_what_fails_does_not_end_the_others(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """There is no such device, so that each part ends with an error; nothing else does."""
+    assert on_gpu.main(["--device", "cuda:99", "--small", "--only", "bits", "kernels"]) == 1
+    text = capsys.readouterr().out
+    assert text.count("FAILED") == 2
+    assert "cuda:99" in text
+
+
+def test_a_part_that_takes_too_long_is_ended() -> None:
+    (row,) = on_gpu.rows_of("kernels", Plan("cpu", ()), limit=0.2)
+    assert not row.passed
+    assert "not done after 0.2 s" in row.figure
+
+
+def test_eight_minutes_are_enough() -> None:
+    assert sum(limit for _, limit in PARTS.values()) <= 480
+
+
+def test_pictures_are_spread_over_the_folder(folder: Path) -> None:
+    assert [os.path.basename(name) for name in on_gpu.pictures_in(folder, 2)] == ["a.png", "c.png"]
+    assert len(on_gpu.pictures_in(folder, 9)) == 4
+
+
+@pytest.mark.slow
+def test_pytest_selects_by_device() -> None:
+    rows = list(PARTS["suite"][0](Plan("cpu", (), suite=("tests/rendering/test_program.py", "-x"))))
+    assert rows[-1].passed
+    assert "2 passed" in rows[-1].figure
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", roofline.KINDS)
+def test_a_step_is_counted(kind: str) -> None:
+    """The bytes of images are known, the operations nearly so."""
+    counts = {count.kernel: count for count in roofline.counts_of_step(kind, 12, 96, 64)}
+    pixels = 96 * 64
+    forward = counts["composite_forward"]
+    assert forward.threads == pixels // 256 * GPU_LANES
+    assert forward.memory["image"].sectors_written == forward.memory["image"].written == 3 * 4 * pixels
+    loss = counts["window_loss"]
+    assert loss.memory["target"].sectors_read == 3 * 4 * pixels
+    assert 3 * 7 * pixels < loss.simple < 3 * 40 * pixels
+    assert counts["radix_sort_pairs"].memory[""].written % (2 * 4) == 0
+    summary = roofline.Summary.of(list(counts.values()))
+    assert summary.nodes > summary.launches == len(counts)
+    assert "composite_backward" in roofline.kernel_table(list(counts.values()))
+
+
+def test_the_roofline_is_the_larger_time() -> None:
+    memory = {"a": Memory(10**9, 0, 10**9, 0)}
+    count = Count("forward", "some", 1, memory, simple=10**9, slow=0, longest=0)
+    assert roofline.roofline(count) == pytest.approx(1e9 / 3.35e12)
+    assert roofline.limit(count) == "memory"
+    count = Count("forward", "some", 1, memory, simple=10**9, slow=10**10, longest=0)
+    assert roofline.roofline(count) == pytest.approx(81e9 / 33.5e12)
+    assert roofline.limit(count) == "arithmetic"
+
+
+def test_copies_and_the_hosts_work_are_counted(folder: Path) -> None:
+    ledger = roofline.run_ledger(folder / "a.png", make_settings(curves=6, iterations=40, subject="photo"))
+    assert ledger.work["densify"].count >= 1
+    assert ledger.to_host["rendering.renderer.read_image"].bytes >= 48 * 32 * 3 * 4
+    assert ledger.kernels > 0
+    assert "densify" in "".join(roofline.run_tables(ledger))
+
+
+def test_a_step_copies_nothing() -> None:
+    from tests.tracing.copies import counting
+
+    step = roofline.scene_step("closed", 12, 96, 64, lanes=1)
+    with counting() as ledger:
+        for _ in range(3):
+            step.advance()
+    assert not ledger.to_host
+    assert not ledger.to_device
