@@ -28,8 +28,8 @@ MODULES = gpu_modules()
 MOST_REGISTERS = 128
 """Of a thread: a multiprocessor then runs two blocks of 256 threads."""
 
-EXCEPTIONS = dict.fromkeys(("chain_backward", "ramp_backward", "walk_strokes"), 168)
-"""Kernels that only gradients and styled strokes need, with the registers that they may take."""
+EXCEPTIONS = dict.fromkeys(("chain_backward", "ramp_backward", "solve", "walk_strokes"), 168)
+"""Kernels that only gradients, styled strokes and drawings need, with the registers that they may take."""
 
 ATOMIC_FLOATS = re.compile(r"\b(atom|red)\.\S*\.b?f(16|32|64)")
 

@@ -14,6 +14,7 @@ import pytest
 import warp as wp
 
 from tests import needs
+from tests.drawing.drawings import logo
 from tests.fit.pictures import step_for, steps_of_all_kinds
 from tests.helpers import renderer_for
 from tests.kernels import racing
@@ -21,10 +22,13 @@ from tests.kernels.modules import all_kernels
 from tests.lanes import divide_as_on_gpu
 from tests.scenes import mixed_scene, with_gradients
 from tests.tracing.trace import KINDS, Race, Tracer, tracing
+from warpsplat.drawing.tidy import finish_drawing
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
 from warpsplat.kernels.tile import quad, tile_column
-from warpsplat.rendering.backend import GPU_LANES
+from warpsplat.rendering.backend import GPU_LANES, Backend
 from warpsplat.rendering.program import Program
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas
 
 THREADS = 2
@@ -67,6 +71,14 @@ def opaque_results() -> Iterator[Arrays]:
         yield [renderer.read_image(), *renderer.parameters.gradients().values()]
 
 
+def drawing_results() -> Iterator[Arrays]:
+    """Fit and tidy a drawing; yield its points."""
+    backend = Backend.on("cpu", THREADS)
+    target = render(logo().scene, backend=backend)
+    done = finish_drawing(target, logo(spread=0.5), Run(backend), finest=10)
+    yield [done.drawing.scene.points]
+
+
 def torch_results() -> Iterator[Arrays]:
     """Render through PyTorch; yield an image and its gradients."""
     from warpsplat.torch import SceneTensors, render
@@ -83,7 +95,7 @@ def torch_results() -> Iterator[Arrays]:
 def results(tracer: Tracer) -> list[Arrays]:
     """Launch every kernel; return what comes out."""
     with tracing(tracer):
-        found = [*step_results(), *opaque_results()]
+        found = [*step_results(), *opaque_results(), *drawing_results()]
         if "torch" not in needs.MISSING:
             found += torch_results()
     return found

@@ -137,7 +137,7 @@ def _nearest(family: Family, samples: Samples, values: Floats, rounds: range) ->
         return distances(points - values[:, None, :2], half, radii)
 
     for number in rounds:
-        reach = np.maximum(FIRST_REACH * size / 2**number, LAST_REACH if number else 0)
+        reach = np.maximum(FIRST_REACH * size / (1 << number), LAST_REACH if number else 0)
         here = off(values)
         slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit], axis=2)
         trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2

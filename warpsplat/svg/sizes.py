@@ -25,7 +25,7 @@ LARGEST = 9
 
 def digits(numbers: Floats) -> npt.NDArray[np.intp]:
     """Return the characters of whole numbers, each with a sign or a space before it."""
-    powers = 10.0 ** np.arange(1, LARGEST)
+    powers = np.cumprod(np.full(LARGEST - 1, 10.0))
     return 2 + np.searchsorted(powers, np.abs(numbers), "right")
 
 
