@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.metadata
 import platform
@@ -187,7 +188,7 @@ def check_cache() -> Check:
 
     folder = Path(str(wp.config.kernel_cache_dir))
     modules = [path for path in folder.glob("wp_*") if path.is_dir()] if folder.is_dir() else []
-    size = sum(file.stat().st_size for path in modules for file in path.iterdir())
+    size = sum(map(_size, modules))
     values = {"folder": str(folder), "modules": len(modules), "bytes": size}
     text = f"{folder}: {len(modules)} modules, {size / 1e6:.0f} MB"
     try:
@@ -200,6 +201,15 @@ def check_cache() -> Check:
     if bad := sum(damaged(path) for path in modules):
         return Check(f"{text}, {bad} damaged", values, "note", "they are rebuilt when needed")
     return Check(text, values)
+
+
+def _size(folder: Path) -> int:
+    """Return the bytes of a folder's files; another process may be removing some of them."""
+    size = 0
+    with contextlib.suppress(FileNotFoundError):
+        for file in folder.iterdir():
+            size += file.stat().st_size
+    return size
 
 
 def check_viewer() -> Check:
