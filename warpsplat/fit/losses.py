@@ -32,6 +32,11 @@ class LossBuffers:
     """SSIM x weight."""
 
 
+def pixel_lanes(backend: Backend) -> int:
+    """Return the threads a tile of losses of the image: one, or one a vector of pixels."""
+    return 1 if backend.lanes == 1 else backend.columns
+
+
 class LossTarget:
     """The image that a render is compared with, and the result of the last comparison."""
 
@@ -49,7 +54,7 @@ class LossTarget:
         self.importance: wp.array = backend.columns_of(to_tiles(weights[..., None])[:, 0])
         self.changed = False
         """Whether ``assign`` has replaced the first target."""
-        sizes = {"tiles": viewport.tile_count, "lanes": backend.lanes}
+        sizes = {"tiles": viewport.tile_count, "lanes": pixel_lanes(backend)}
         self.buffers = backend.allocate(LossBuffers, sizes)
         self.buffers.loss.fill_(-1.0)
         self.value_count = 3 * viewport.pixel_count
@@ -97,20 +102,20 @@ def _launch_image_error(program: Program, inputs: LossInputs, weight: float) -> 
     renderer, target = inputs.renderer, inputs.target
     film, viewport, backend = renderer.film, renderer.viewport, renderer.backend
     arrays = (film.buffers, target, target.buffers)
-    cache = renderer.bins.buffers.tile_cache
+    cache, lanes = renderer.bins.buffers.tile_cache, pixel_lanes(backend)
     if film.planes == 4:
         program.launch(
             alpha.make_alpha_loss(backend.column),
-            (viewport.tile_count, backend.lanes),
+            (viewport.tile_count, lanes),
             *arrays,
             tile_cache=cache,
-            lane_columns=backend.lane_columns,
+            lane_columns=backend.columns // lanes,
             split=True,
         )
         return
     program.launch(
-        image.image_loss if backend.lanes == 1 else window.window_loss,
-        (viewport.tile_count, 3, backend.lanes),
+        image.image_loss if lanes == 1 else window.window_loss,
+        (viewport.tile_count, 3, lanes),
         *arrays,
         viewport,
         tile_cache=cache,
