@@ -31,6 +31,10 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
+LossName = Literal["l2", "ssim", "edges"]
+
+LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 1.0}
+"""Weights of what joins the squared error."""
 
 PRESETS: dict[Quality, dict[str, Any]] = {
     "draft": {
@@ -178,6 +182,12 @@ class Settings:
         "A flat colour for each shape, a gradient, or whichever is worth its bytes.",
         subjects=FITTED,
     )
+    loss: LossName = option(
+        "l2",
+        "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
+        subjects=FITTED,
+        refine=True,
+    )
     levels: tuple[int, ...] = option(
         (),
         "Total number of shapes after each level, such as 64,256,1024.",
@@ -269,7 +279,9 @@ class Settings:
     softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
     gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
-    ssim: float = research(0.0, "Weight of 1 - SSIM: lowers PSNR and SSIMULACRA2.", WEIGHT)
+    loss_weight: float | None = research(
+        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 1 edges"
+    )
     texture: float = research(
         0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION
     )
