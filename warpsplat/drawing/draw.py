@@ -112,6 +112,10 @@ def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
     size = enlargement(problem.target)
     scene = enlarged(done.drawing.scene, size, *problem.size)
+    if problem.settings.strokes and not run.over():
+        from warpsplat.drawing.pen import with_strokes
+
+        scene = with_strokes(scene, problem.settings, run)
     made = as_fit(scene, done.per_pixel / size, problem, run)
     return Sketch(made, _size(made, problem.settings), done.drawing)
 

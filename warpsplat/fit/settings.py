@@ -275,6 +275,10 @@ class Settings:
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
+    strokes: bool = option(
+        False,
+        "Of drawings: what a round pen draws in even width becomes strokes; drafts have none.",
+    )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )
