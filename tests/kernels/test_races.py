@@ -58,7 +58,12 @@ def step_results() -> Iterator[Arrays]:
         step.advance()
         renderer, groups = step.renderer, step.state.parameters.groups.values()
         arrays = [array.numpy() for group in groups for array in (group.value, group.grad, group.moment2)]
-        yield [*arrays, renderer.read_image(), step.removal_costs(), renderer.visible().share]
+        yield [
+            *arrays,
+            renderer.read_image(),
+            step.objective.quadratic().removal_costs(),
+            renderer.visible().share,
+        ]
         assert np.isfinite(step.psnr())
 
 
