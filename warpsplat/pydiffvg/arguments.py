@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -14,14 +14,15 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
+from warpsplat.pydiffvg.gather import FIRST, Place, places_of
 from warpsplat.pydiffvg.shape import Circle, Ellipse, Path, Polygon, Rect, Shape, ShapeGroup
 from warpsplat.scene import Paint
 from warpsplat.svg.shapes import LineStyle
 
 Tensor = torch.Tensor
 
-ZERO, ONE, FIRST = 0, 1, 2
-"""Indices of a scene's numbers: the constants 0 and 1, then the values of its tensors one after the other."""
+ZERO, ONE = 0, 1
+"""Indices of a scene's numbers: the constants 0 and 1; from FIRST on come the values of its tensors."""
 
 IDENTITY = np.eye(3).tolist()
 
@@ -99,6 +100,11 @@ class SceneArguments:
     structure: Structure
     tensors: tuple[Tensor, ...]
     """For each shape its coordinates and width, then for each group its fill, stroke and transform."""
+
+    @functools.cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Where the tensors' values lie among the scene's numbers."""
+        return places_of(self.tensors)
 
 
 def serialize(
@@ -235,23 +241,39 @@ def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[obje
     return owners + fields + list(chain.from_iterable(vars(each).values() for each in gradients))
 
 
-def _numbers(objects: list[object]) -> list[object]:
-    """Return sizes of tensors, and numbers that belong to the structure.
+def _numbers(
+    shapes: Sequence[Shape], groups: Sequence[ShapeGroup], tensors: Sequence[Tensor]
+) -> Iterator[object]:
+    """Yield sizes of tensors, and numbers that belong to the structure.
 
-    They are compared by value, as code can write into tensors without leaving a trace.
+    They are compared by value, as code can write into tensors without leaving a trace; and one by one, as
+    thousands of new objects at a time would have Python look for cycles.
     """
-    found: list[object] = [each.shape for each in objects if isinstance(each, torch.Tensor)]
-    for each in objects:
-        if isinstance(each, Path):
-            found.append(each.num_control_points.tolist())
-        elif isinstance(each, ShapeGroup):
-            matrix = each.shape_to_canvas
-            found += each.shape_ids.tolist(), matrix.tolist(), matrix.requires_grad
-    return found
+    for tensor in tensors:
+        yield tensor.shape
+    for shape in shapes:
+        if isinstance(shape, Path):
+            yield shape.num_control_points.tolist()
+    for group in groups:
+        matrix = group.shape_to_canvas
+        yield group.shape_ids.tolist()
+        yield matrix.tolist()
+        yield matrix.requires_grad
 
 
-_last: tuple[list[object], list[object], SceneArguments] | None = None
-"""Objects, numbers and the scene that was made of them."""
+class _Cached(NamedTuple):
+    """A scene and what it was made of."""
+
+    frame: tuple[object, ...]
+    """Size, device and number of shapes."""
+    objects: list[object]
+    tensors: list[Tensor]
+    """Those of the objects."""
+    numbers: list[object]
+    scene: SceneArguments
+
+
+_last: _Cached | None = None
 
 
 def serialize_cached(
@@ -259,16 +281,22 @@ def serialize_cached(
 ) -> SceneArguments:
     """Return ``serialize`` of the arguments, or the last result where only values in tensors have changed."""
     global _last  # noqa: PLW0603 - one scene is kept, with its tensors, until the next
-    objects = _objects(shapes, groups)
-    numbers = [int(width), int(height), device, len(shapes), *_numbers(objects)]
-    if last := _last:  # another thread may replace it meanwhile
-        before, before_numbers, scene = last
-        same = len(objects) == len(before) and all(map(operator.is_, objects, before))
-        if same and numbers == before_numbers:
-            return scene
+    frame, objects = (int(width), int(height), device, len(shapes)), _objects(shapes, groups)
+    last = _last  # another thread may replace it meanwhile
+    if (
+        last
+        and frame == last.frame
+        and len(objects) == len(last.objects)
+        and all(map(operator.is_, objects, last.objects))
+        and all(map(operator.eq, _numbers(shapes, groups, last.tensors), last.numbers))
+    ):
+        return last.scene
     scene = serialize(width, height, shapes, groups, device)
     own = set(map(id, objects))
     # Copies and results of operations are made again for each scene.
-    is_reusable = all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors)
-    _last = (objects, numbers, scene) if is_reusable else None
+    if all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors):
+        tensors = [each for each in objects if isinstance(each, Tensor)]
+        _last = _Cached(frame, objects, tensors, list(_numbers(shapes, groups, tensors)), scene)
+    else:
+        _last = None
     return scene
