@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.drawing.drawings import seam
-from tests.scenes import mixed_scene, picture_scene, with_gradients
+from tests.scenes import forms_scene, mixed_scene, picture_scene, with_gradients
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import canvas_for
@@ -74,3 +74,4 @@ def steps_of_all_kinds(device: str, threads: int = 1) -> Iterator[Step]:
     layers = np.minimum(np.arange(len(painted)), 1).astype(np.int32)
     layered = replace(painted, frames=np.where(radial, circle, painted.frames), layer=layers)
     yield step_for(layered, picture(), device, make_settings(loss="edges"), threads=threads)
+    yield step_for(forms_scene(64, 48).append(mixed_scene(64, 48)), picture(), device, threads=threads)

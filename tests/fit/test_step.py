@@ -17,7 +17,7 @@ from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import evaluate_file
 from warpsplat.fit.settings import LossName, Settings, make_settings
 from warpsplat.metrics import psnr
-from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.backend import GPU_LANES, Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
@@ -89,9 +89,12 @@ def test_a_step_is_the_same_with_the_lanes_of_a_gpu(
     scene = replace(scene, canvas=Canvas(59, 41, None)) if planes == 4 else scene
     weights = rng.uniform(0.5, 1.5, (41, 59)).astype(np.float32)
     settings, found = make_settings(loss=loss, loss_weight=0.1, iterations=50), []
-    for gpu_lanes in (False, True):
-        if gpu_lanes:
-            divide_as_on_gpu(monkeypatch)
+    for lanes in (1, 16, GPU_LANES):
+        divide_as_on_gpu(monkeypatch, lanes)
+        step = step_for(scene, target, device, settings, weights=weights)
+        step.advance()
+        gradients = step.renderer.parameters.gradients()
+        visible = step.renderer.visible()
         step = step_for(scene, target, device, settings, weights=weights)
         step.advance()
         gradients = step.renderer.parameters.gradients()
@@ -105,8 +108,9 @@ def test_a_step_is_the_same_with_the_lanes_of_a_gpu(
             visible.color,
         )
         found.append([np.array(step.objective.value()), np.array(step.psnr()), *gradients.values(), *read])
-    for one, many in zip(*found, strict=True):
-        assert relative_error(many, one) < 1e-4
+    for one, *others in zip(*found, strict=True):
+        for many in others:
+            assert relative_error(many, one) < 1e-4
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])

@@ -36,6 +36,11 @@ class LossBuffers:
     """Squared slopes of the error x weight."""
 
 
+def pixel_lanes(backend: Backend) -> int:
+    """Return the threads a tile of losses of the image: one, or one a vector of pixels."""
+    return 1 if backend.lanes == 1 else backend.columns
+
+
 class LossTarget:
     """The image that a render is compared with, and the result of the last comparison."""
 
@@ -66,7 +71,7 @@ class LossTarget:
         self.importance: wp.array = backend.columns_of(to_tiles(weights[..., None])[:, 0])
         self.changed = False
         """Whether ``assign`` has replaced the first target."""
-        sizes = {"tiles": viewport.tile_count, "planes": target.shape[2], "lanes": backend.lanes}
+        sizes = {"tiles": viewport.tile_count, "planes": target.shape[2], "lanes": pixel_lanes(backend)}
         self.buffers = backend.allocate(LossBuffers, sizes)
         self.buffers.loss.fill_(-1.0)
         self.value_count = 3 * viewport.pixel_count
@@ -134,22 +139,23 @@ def _launch_image_error(program: Program, inputs: LossInputs, weight: float) -> 
     renderer, target = inputs.renderer, inputs.target
     film, viewport, backend = renderer.film, renderer.viewport, renderer.backend
     arrays = (film.buffers, target, target.buffers)
-    cache, similarity_weight = renderer.bins.buffers.tile_cache, weight_of("ssim", inputs)
+    cache, lanes = renderer.bins.buffers.tile_cache, pixel_lanes(backend)
+    similarity_weight = weight_of("ssim", inputs)
     if film.planes == 4:
         if similarity_weight > 0:
             raise UsageError("loss ssim needs an image without transparency; --background gives it a colour")
         program.launch(
             alpha.make_alpha_loss(backend.column),
-            (viewport.tile_count, backend.lanes),
+            (viewport.tile_count, lanes),
             *arrays,
             tile_cache=cache,
-            lane_columns=backend.lane_columns,
+            lane_columns=backend.columns // lanes,
             split=True,
         )
         return
     program.launch(
-        image.image_loss if backend.lanes == 1 else window.window_loss,
-        (viewport.tile_count, 3, backend.lanes),
+        image.image_loss if lanes == 1 else window.window_loss,
+        (viewport.tile_count, 3, lanes),
         *arrays,
         viewport,
         tile_cache=cache,
@@ -170,9 +176,10 @@ def weight_of(name: LossName, inputs: LossInputs) -> float:
 def _launch_edges(program: Program, inputs: LossInputs, weight: float) -> None:
     renderer, target = inputs.renderer, inputs.target
     film, viewport, backend = renderer.film, renderer.viewport, renderer.backend
-    dim = (viewport.tile_count, film.planes, backend.lanes)
+    lanes = pixel_lanes(backend)
+    dim = (viewport.tile_count, film.planes, lanes)
     across, down = (backend.array(backend.column, *film.buffers.image.shape) for _ in range(2))
-    values = {"across_grad": across, "down_grad": down, "lane_columns": backend.lane_columns}
+    values = {"across_grad": across, "down_grad": down, "lane_columns": backend.columns // lanes}
     sources = (film.buffers, target, target.buffers, viewport)
     slopes, backward = edges.make_edge_slopes(backend.column), edges.make_edge_backward(backend.column)
     program.launch(slopes, dim, *sources, values, edge_weight=weight, split=True)

@@ -14,15 +14,15 @@ import numpy as np
 from warpsplat.fit.export import export, shown_image
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
-from warpsplat.scene import OPACITY_RANGE, Paint, Scene
+from warpsplat.scene import OPACITY_RANGE, Basis, Paint, Scene
 from warpsplat.svg.write import GRIDS, resized, rounded
 
 if TYPE_CHECKING:
     from warpsplat.fit.step import Step
 
 STAGES, STAGE_SHARE = 3, 0.015
-"""A third of the control points each (of cubics those on the outline, then the handles), and the steps after
-each stage as a share of the run."""
+"""A third of the control points each (of cubics those on the outline, then the handles), or of the shapes of
+forms; and the steps after each stage as a share of the run."""
 
 MAX_LOSS, MAX_TRADED_LOSS = 0.03, 0.06
 """Maximum loss by rounding [dB], also where bytes are traded for error: beyond, refitting fails."""
@@ -132,7 +132,9 @@ def freeze_stage(step: Step, stage: int) -> None:
     parameters = step.state.parameters
     scene = parameters.scene()
     low = rounded(scene, step.state.per_pixel)
-    index = np.arange(len(scene.points)) - np.repeat(scene.first[:-1], scene.point_counts())
+    shapes = np.repeat(np.arange(len(scene)), scene.point_counts())
+    index = np.arange(len(scene.points)) - scene.first[shapes]
+    index = np.where(scene.basis[shapes] > Basis.SPLINE, shapes, index)  # values are rounded together
     frozen = index % STAGES < stage
     points = np.where(frozen[:, None], low.points, scene.points)
     parameters.assign(replace(scene, points=points, widths=low.widths))

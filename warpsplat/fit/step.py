@@ -21,6 +21,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.forms import record_gather
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Capacity, Renderer
@@ -104,8 +105,12 @@ class Step:
         backend, state = self.renderer.backend, self.state
         inputs = LossInputs(self.renderer, self.loss_target, self.settings, state.clock)
         update = backend.program("update")
-        for loss in losses.SHAPE_LOSSES:
-            loss.record(update, inputs)
+        beside_forms = [backend.program("update")] if state.parameters.forms else []
+        if state.parameters.curves:  # the outlines of forms are smooth by themselves
+            for loss in losses.SHAPE_LOSSES:
+                loss.record(*beside_forms or [update], inputs)
+        for program in beside_forms:
+            record_gather(program, state.parameters)  # with what the losses added
         record_adam(update, state.parameters, state.clock, self.settings)
         compare = losses.image_program(inputs)
         self.objective = Objective(inputs, compare)
@@ -116,6 +121,7 @@ class Step:
             self.renderer.forward_program,  # render
             compare,
             self.renderer.backward_program,  # back-propagate
+            *beside_forms,
             *(program for level in levels for program in level_programs(level, state.parameters)),
             update,
         )

@@ -187,7 +187,7 @@ def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptSc
     target, settings = problem.target, problem.settings
     width, height = problem.size
     apart = settings.background != "none"
-    base = load_kept(text, width, height, name, background_apart=apart, keep=keep)
+    base = load_kept(text, width, height, name, background_apart=apart, keep=keep, forms=True)
     with naming(name):
         _check_read(text, base.scene, base.has_background)
     background, has_background = base.scene.canvas.background, base.has_background

@@ -30,6 +30,7 @@ class Options(RefineOptions, total=False):
     subject: Subject | None
     closed: bool | None
     open: bool | None
+    shape: str | None
     mixed: bool | None
     quality: Quality | None
     iterations: int | None
