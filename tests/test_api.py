@@ -228,7 +228,7 @@ def test_what_is_public_is_there_and_light() -> None:
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
         *("starting_scene", "load_image", "vectorize_several", "suggest"),
         *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
-        *("Suggestion", "Expected"),
+        *("Suggestion", "Expected", "CustomLoss"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
     public |= {
