@@ -17,6 +17,7 @@ from warpsplat.kernels.tile import tile_column, total
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
+STEEPER = wp.constant(1.0e30)  # the same for coverages, which may be so small that they are not seen
 TINY = wp.constant(1.0e-9)
 
 
@@ -27,7 +28,7 @@ def slope_of(mapping: wp.int32, signed: Any):
     slope = one - wp.abs(signed)
     if mapping == constants.AREA:
         slope = wp.min(STEEP * slope, one)
-        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
+        slope = wp.cw_mul(slope, wp.min(wp.max(STEEPER * signed, -one), one))
     return slope
 
 

@@ -31,9 +31,10 @@ def premultiplied_grads(
     image_grad: wp.array3d[Any],
     tile: wp.int32,
     x: wp.int32,
+    opaque: Any,
 ):
     """Return the factor from gradients of straight colours to those of premultiplied ones, and the gradients
-    of the opacity and of hit, in a column of pixels.
+    of the opacity and of hit, in a column of pixels whose opacities are ``opaque``.
 
     Opacities that are no longer divided by, and pixels that are hit throughout, have none.
     """
@@ -42,12 +43,11 @@ def premultiplied_grads(
     along = along + wp.cw_mul(image[tile, 1, x], image_grad[tile, 1, x])
     along = along + wp.cw_mul(image[tile, 2, x], image_grad[tile, 2, x])
     touched = hit[tile, x]
-    opaque = image[tile, 3, x]
     divisor = wp.max(opaque, constants.NOTHING * one)
-    above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), 0.0 * one), one)
+    above = wp.min(opaque / constants.NOTHING, one)
     opacity_grad = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
     partly = wp.min(STEEP * (one - touched), one)
-    hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, TINY * one)), partly)
+    hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, constants.NOTHING * one)), partly)
     return wp.cw_div(touched, divisor), opacity_grad, hit_grad
 
 
@@ -99,10 +99,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
             green = image_grad[tile, 1, x]
             blue = image_grad[tile, 2, x]
             if straight:
-                factor, opaque, hit_grad = premultiplied_grads(image, hit, image_grad, tile, x)
-                red = wp.cw_mul(red, factor)
-                green = wp.cw_mul(green, factor)
-                blue = wp.cw_mul(blue, factor)
+                opaque = zero
                 behind = zero
             else:
                 opaque = zero
@@ -122,6 +119,13 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                     if opacity < 0.0:
                         seen = wp.cw_mul(seen, paint_columns[wp.max(slot, -1 - slot), 3, x])
                 transmittance = transmittance - seen
+                if straight:
+                    opaque = opaque + seen
+            if straight:
+                factor, opaque, hit_grad = premultiplied_grads(image, hit, image_grad, tile, x, opaque)
+                red = wp.cw_mul(red, factor)
+                green = wp.cw_mul(green, factor)
+                blue = wp.cw_mul(blue, factor)
             for n in range(start, stop):
                 k = start + stop - 1 - n
                 paint = list_paint[k]
