@@ -14,6 +14,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
+from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     Option,
     nearest,
@@ -149,6 +150,7 @@ class Density:
         check_fields(self, "density ")
 
 
+@described
 @dataclass(frozen=True)
 class Settings:
     """Everything but the image that decides the result. Fields without help are set by other options."""
