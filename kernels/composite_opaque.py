@@ -16,7 +16,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.composite_backward import slope_of
 from warpsplat.kernels.paint.flat import paint_against
-from warpsplat.kernels.tile import total
+from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -62,6 +62,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
             is added to that of each coverage.
     """
     painted = painted or straight
+    single_lane = column is tile_column
     name = "straight_backward" if straight else "opaque_paint_backward" if painted else "opaque_backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
@@ -179,11 +180,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                         paint_columns[slot, 1, x] = green_grad
                         paint_columns[slot, 2, x] = blue_grad
                         paint_columns[slot, 3, x] = opacity * wp.cw_mul(covered, alpha_grad)
-                if lane_columns == 1:
-                    slot_grad[slot, lane] = wp.vec4(
-                        total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
-                    )
-                else:
+                if single_lane:
                     if x > 0:
                         red_grad = red_grad + slot_columns[slot, 0]
                         green_grad = green_grad + slot_columns[slot, 1]
@@ -193,5 +190,10 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                     slot_columns[slot, 1] = green_grad
                     slot_columns[slot, 2] = blue_grad
                     slot_columns[slot, 3] = opacity_grad
+                else:
+                    grad = wp.vec4(total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad))
+                    if x > lane * lane_columns:
+                        grad = grad + slot_grad[slot, lane]
+                    slot_grad[slot, lane] = grad
 
     return backward

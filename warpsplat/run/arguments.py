@@ -10,6 +10,7 @@ from inspect import Parameter
 from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
 from warpsplat.errors import UsageError, shown
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.options import nearest
 from warpsplat.fit.settings import Settings
 from warpsplat.run.options import settings_from
@@ -58,6 +59,15 @@ def settings_given(function: Callable[..., Any], settings: Settings | None, **op
     if others := [name for name, value in options.items() if value is not None]:
         raise UsageError(f"settings are given, and {others[0]} as well")
     return settings
+
+
+def custom_loss(options: Mapping[str, Any]) -> tuple[CustomLoss | None, dict[str, Any]]:
+    """Return the loss among options if it is a function, and the other options."""
+    given = options.get("loss")
+    if not callable(given) and not isinstance(given, CustomLoss):
+        return None, {**options}
+    made = given if isinstance(given, CustomLoss) else CustomLoss(given)
+    return made, {**options, "loss": None}
 
 
 @contextmanager
