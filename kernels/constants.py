@@ -66,7 +66,7 @@ TRANSMITTANCE_MIN = 1.0e-4
 SEEN = 0.5 / 255.0
 """Opacity from which on a shape hides the black that pictures that are not premultiplied begin with."""
 
-NOTHING = 1.0e-4
+NOTHING = 1.0e-28
 """Opacity of a pixel below which its colour is no longer divided by it."""
 
 EPSILON = 1.0e-6
@@ -105,6 +105,16 @@ PARTIAL = COVERED + UNCOVERED
 
 HIDDEN = 4
 """Added to the state of a slot that is hidden by opaque slots in front."""
+
+ALIGNED = 8
+"""Added to PARTIAL where an edge of the shape lies on a border of pixels."""
+
+TILE_MARGIN = 0.01
+"""Distance [px] from a tile at which an edge of a fill counts as touching it."""
+
+NEARLY_NONE = 1.0e-20
+NEARLY_ALL = 1.0 - 2.0**-24
+"""Coverages that show as 0 and 1 but have a gradient, where an edge on a border of pixels may change them."""
 
 AREA = 0
 PRODUCT = 1

@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.forms import form_of
 from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Picture, Rule, Scene
 from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import starts_of
 
-CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+CURVES = CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
 FILL_CUBICS, STROKE_CUBICS = 4, 3
 FILL_QUADRATICS, STROKE_QUADRATICS = 12, 5
 """Béziers of a shape, about as many as in a run."""
@@ -80,6 +81,16 @@ def ragged_scene(shapes: Sequence[Outline], width: int = 40, height: int = 36, *
 
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
+FORMS: tuple[tuple[Basis, Kind, int], ...] = (
+    *((basis, FILL, 5) for basis in Basis if basis.is_form),
+    *(
+        (Basis.POLYGON, STROKE, 2),
+        (Basis.POLYGON, FILL, 3),
+        (Basis.POLYGON, STROKE, 4),
+        (Basis.CIRCLE, FILL, 0),
+    ),
+)
+"""Forms, kinds, and numbers of vertices where the form has them."""
 MIXED_CUBICS: tuple[Outline, ...] = (
     *((FILL, CUBIC, 4), (STROKE, CUBIC, 3), (STROKE, CUBIC, 1), (FILL, CUBIC, 2)),
     *((STROKE, CUBIC, 5), (FILL, CUBIC, 6), (STROKE, CUBIC, 2), (FILL, CUBIC, 4)),
@@ -124,6 +135,24 @@ def contours_scene(kind: Kind, rule: Rule = Rule.NONZERO, *, seed: int = 0) -> S
             )
         )
     return functools.reduce(Scene.append, shapes)
+
+
+def forms_scene(width: int = 40, height: int = 36, *, seed: int = 0) -> Scene:
+    """Return shapes of all forms, filled and stroked, turned and partly off the canvas."""
+    rng = np.random.default_rng(seed)
+    scenes = []
+    for basis, kind, count in FORMS:
+        scene = random_scene(kind, 1, width, height, seed=seed + len(scenes))
+        centre, area = rng.uniform(0.2, 0.8, (1, 2)) * [width, height], rng.uniform(90, 250, 1)
+        values = form_of(basis.name).start(centre, area, rng.uniform(0.2, 1.3, 1), max(count, 3))
+        values = values[:, : count or None]
+        values[:, 1:] *= rng.uniform(0.7, 1.2, values[:, 1:].shape)
+        values = np.ascontiguousarray(values, np.float32).reshape(-1, 2)
+        first = np.array([0, len(values)], np.int32)
+        scenes.append(
+            replace(scene, basis=np.array([basis], np.int32), points=values, first=first, starts=first)
+        )
+    return functools.reduce(Scene.append, scenes)
 
 
 def with_gradients(scene: Scene, *, seed: int = 0) -> Scene:

@@ -18,7 +18,7 @@ from tests import ROOT
 from warpsplat import extensions
 from warpsplat.cli.main import COMMANDS
 
-CORE = ("errors", "native", "portable", "scene", "kernels")
+CORE = ("errors", "native", "portable", "scene", "forms", "kernels")
 
 ALLOWED: dict[str, tuple[str, ...]] = {
     "extensions": ("errors",),
@@ -27,9 +27,10 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "alpha": (),
     "portable": (),
     "kernels": (),
-    "scene": ("kernels.constants", "errors", "portable"),
+    "forms": ("kernels", "portable"),
+    "scene": ("kernels.constants", "errors", "forms", "portable"),
     "files": ("errors", "native", "portable", "scene", "_version"),
-    "svg": ("errors", "native", "portable", "scene", "files.inputs"),
+    "svg": ("errors", "forms", "native", "portable", "scene", "files.inputs"),
     "metrics": ("errors", "portable", "svg", "ssimulacra2"),
     "ssimulacra2": (),
     "rendering": CORE,

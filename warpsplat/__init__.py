@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warpsplat.errors import ResourceError as ResourceError
     from warpsplat.errors import UsageError as UsageError
     from warpsplat.errors import WarpsplatError as WarpsplatError
+    from warpsplat.fit.custom_loss import CustomLoss as CustomLoss
     from warpsplat.fit.progress import Progress as Progress
     from warpsplat.fit.progress import Snapshot as Snapshot
     from warpsplat.fit.settings import Settings as Settings
@@ -56,6 +57,7 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.progress"),
+    "CustomLoss": "warpsplat.fit.custom_loss",
     "to_pillow": "warpsplat.run.render",
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",

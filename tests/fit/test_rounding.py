@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for
-from tests.scenes import mixed_scene, random_scene, started_alike
+from tests.scenes import CURVES, mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
@@ -147,7 +147,7 @@ def test_the_coarsest_grid_within_the_loss(
 
 
 @pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("basis", list(Basis))
+@pytest.mark.parametrize("basis", CURVES)
 def test_a_run_ends_with_what_the_file_has(device: str, kind: Kind, basis: Basis) -> None:
     settings = make_settings(kind=kind, basis=basis, curves=10, iterations=60)
     made = fit(Problem(picture(), settings), Run(Backend.on(device)))

@@ -12,8 +12,8 @@ import numpy as np
 from PIL import Image
 
 from tests.fuzz.vocabulary import HEAD, HEADS, HEIGHT, SHAPES, WIDTH, YAMLS
-from tests.scenes import ragged_scene, random_scene, with_gradients
-from warpsplat.scene import Basis, Kind
+from tests.scenes import CURVES, ragged_scene, random_scene, with_gradients
+from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
 
 
@@ -94,7 +94,7 @@ def svgs() -> list[Seed]:
 def own_svg(kind: str, per_pixel: float = 8) -> bytes:
     """Return an SVG written here, with curves of both bases; ``kind``: "fill" or "stroke"."""
     painted = Kind[kind.upper()]
-    outlines = [(painted, basis, beziers) for beziers in (3, 9, 4) for basis in Basis]
+    outlines = [(painted, basis, beziers) for beziers in (3, 9, 4) for basis in CURVES]
     scene = ragged_scene(outlines, WIDTH, HEIGHT, seed=1)
     return write_svg(scene, per_pixel=per_pixel, metadata="0123ABab").encode()
 

@@ -46,9 +46,9 @@ def takes(kernel: wp.Kernel, column: Any) -> bool:
 
 
 def kernel_folders() -> list[Path]:
-    """Those of the core and of extensions."""
+    """Those of the core, of extensions, and of forms."""
     package = Path(warpsplat.__file__).parent
-    return [package / "kernels", *sorted(package.glob("*/kernels"))]
+    return [package / "kernels", *sorted(package.glob("*/kernels")), package / "forms"]
 
 
 def all_kernels(column: Any = tile_column) -> list[wp.Kernel]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import mixed_scene, with_gradients
+from tests.scenes import forms_scene, mixed_scene, with_gradients
 from warpsplat.motion.moving import kept_points, moving_elements
 from warpsplat.scene import Basis, Scene
 
@@ -46,6 +46,14 @@ def test_paths_move_with_equal_commands() -> None:
         assert commands(first) == commands(second)
         x, y, u, v = (int(n) for part in (first, second) for n in re.findall(r"-?\d+", part)[:2])
         assert abs(u - x - 10) <= 2 and abs(v - y - 10) <= 2, "400 units on a canvas of 40"
+
+
+def test_forms_move_as_their_outlines() -> None:
+    scene = forms_scene()
+    lines, rules = made(scene, replace(scene, points=scene.points + np.float32(1)))
+    drawn = [each.drawn() for each in (scene, replace(scene, points=scene.points + np.float32(1)))]
+    assert (lines, rules) == made(*drawn)
+    assert all(len(set(places(line))) == 2 for line in lines)
 
 
 def test_shapes_fade_in_and_out() -> None:

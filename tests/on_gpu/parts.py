@@ -24,13 +24,13 @@ from tests import ROOT
 from tests.fit.pictures import picture, step_for
 from tests.kernels.modules import all_kernels
 from tests.runs import scored, vectorize
-from tests.scenes import mixed_scene, random_scene, styled_scene, with_gradients
+from tests.scenes import CURVES, forms_scene, mixed_scene, random_scene, styled_scene, with_gradients
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.kernel_cache import load
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.scene import Basis, Cap, FloatArray, Join, Kind, Scene
+from warpsplat.scene import Cap, FloatArray, Join, Kind, Scene
 from warpsplat.tools.bench import bench, bench_scene, peak_memory
 
 MEGA = 1e6
@@ -99,7 +99,7 @@ def suite(plan: Plan) -> Iterator[Row]:
     if find_spec("xdist") and len(plan.suite) == 1:
         command += ["-n", str(min(8, os.cpu_count() or 1)), "--dist", "worksteal"]
     done = subprocess.run([*command, *plan.suite], cwd=ROOT, capture_output=True, text=True, check=False)
-    lines = [line for line in done.stdout.splitlines() if line.strip()]
+    lines = [line for line in (done.stdout or done.stderr).splitlines() if line.strip()]
     for line in lines:
         if line.startswith(("FAILED", "ERROR")):
             yield Row("a test", line[:200].replace("|", "/"), passed=False)
@@ -122,10 +122,11 @@ def scenes(plan: Plan) -> dict[str, Scene]:
     found = {
         f"{kind.name.lower()}, {basis.name.lower()}": random_scene(kind, 30, 90, 70, basis=basis)
         for kind in Kind
-        for basis in Basis
+        for basis in CURVES
     }
     found |= {
         "mixed": mixed_scene(90, 70),
+        "forms": forms_scene(90, 70).append(mixed_scene(90, 70)),
         "gradients": with_gradients(mixed_scene(90, 70)),
         "styled": styled_scene(Cap.SQUARE, Join.MITER),
     }

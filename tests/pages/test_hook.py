@@ -31,6 +31,14 @@ def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, capfd: pytest.Ca
     assert "<span>refine</span>" not in page.read_text("utf-8")
 
 
+@pytest.mark.parametrize("shape", ["ellipse", "rectangle", "line"])
+def test_a_report_of_other_shapes(shape: str, image: Path, tmp_path: Path) -> None:
+    svg, page = tmp_path / "a.svg", tmp_path / "a.html"
+    assert run("vectorize", image, "-o", svg, "--report", page, "--shape", shape, *QUICK) == 0
+    assert "<path" not in svg.read_text("utf-8")
+    assert "<span>--shape</span>" in page.read_text("utf-8")
+
+
 @pytest.mark.parametrize("place", ["photo.png", "a.svg", "a.txt", "-", "other.html", "no/a.html"])
 def test_where_a_report_cannot_be(
     place: str, image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]

@@ -13,12 +13,12 @@ import pytest
 
 import warpsplat
 from tests.fit.pictures import picture
-from tests.scenes import random_scene
+from tests.scenes import forms_scene, mixed_scene, random_scene
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.packed import is_packed, pack, unpack
 from warpsplat.fit import checkpoint
 from warpsplat.run import checkpoint as module
-from warpsplat.scene import Kind
+from warpsplat.scene import Kind, Scene
 from warpsplat.svg.write import read_metadata, write_svg
 
 PICTURE = picture(48, 36)
@@ -38,9 +38,8 @@ def fitted(**given: Any) -> warpsplat.Result:
     return warpsplat.vectorize(**{**common, "device": "cpu", "threads": 1, **given})
 
 
-def refined(**given: Any) -> warpsplat.Result:
-    height, width = PICTURE.shape[:2]
-    text = write_svg(random_scene(Kind.FILL, count=6, width=width, height=height, seed=3))
+def refined(scene: Scene, **given: Any) -> warpsplat.Result:
+    text = write_svg(scene)
     return warpsplat.refine(text, PICTURE, iterations=56, device="cpu", threads=1, **given)
 
 
@@ -57,7 +56,10 @@ RUNS: dict[str, Callable[..., warpsplat.Result]] = {
     "importance": lambda **given: fitted(importance=MASK, **given),
     "size": lambda **given: fitted(max_bytes=1200, curves=34, iterations=16, **given),
     "target": lambda **given: fitted(target_psnr=20.0, curves=10, iterations=12, **given),
-    "refine": refined,
+    "ellipses": lambda **given: fitted(shape="ellipse", **given),
+    "lines": lambda **given: fitted(shape="line", **given),
+    "refine": lambda **given: refined(random_scene(Kind.FILL, 6, 48, 36, seed=3), **given),
+    "refine forms": lambda **given: refined(forms_scene(48, 36).append(mixed_scene(48, 36)), **given),
 }
 
 
@@ -145,7 +147,7 @@ def test_another_run_is_refused(saved: Path, given: dict[str, Any], cause: str) 
     with pytest.raises(UsageError, match=rf"run\.checkpoint: .*{cause}"):
         fitted(checkpoint=saved, resume=True, **given)
     with pytest.raises(UsageError, match="command differs"):
-        refined(checkpoint=saved, resume=True)
+        RUNS["refine"](checkpoint=saved, resume=True)
     assert is_packed(saved)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import ragged_scene, random_scene, started_alike
+from tests.scenes import CURVES, ragged_scene, random_scene, started_alike
 from tests.svg.foreign import ROUND, SMALL
 from warpsplat.metrics import psnr
 from warpsplat.scene import Basis, Kind, Scene
@@ -15,7 +15,7 @@ from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
-CUBIC, SPLINE = Basis.CUBIC, Basis.SPLINE
+CUBIC, SPLINE = CURVES
 BOTH = {
     Kind.FILL: [(CUBIC, 4), (SPLINE, 12), (SPLINE, 3), (CUBIC, 2), (SPLINE, 7), (CUBIC, 5)],
     Kind.STROKE: [(CUBIC, 3), (SPLINE, 5), (SPLINE, 1), (CUBIC, 1), (SPLINE, 2)],
@@ -50,7 +50,7 @@ def test_files_come_back(kind: Kind, width: int, height: int) -> None:
         assert write_svg(rounded(scene, per_pixel), per_pixel=per_pixel) == text
 
 
-@pytest.mark.parametrize("basis", list(Basis))
+@pytest.mark.parametrize("basis", CURVES)
 def test_dots(basis: Basis) -> None:
     """A stroke without extent is visible and stays; such a fill is not."""
     for kind in Kind:

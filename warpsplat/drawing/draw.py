@@ -20,7 +20,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
 
 SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5.5e-4, 1.5e-6
-"""What the fit of a trace takes on one core, roughly [s]."""
+"""Rough time of fitting a trace on one core [s]."""
 
 LONG = 4.0
 """Time from which on it is announced [s]."""

@@ -26,7 +26,7 @@ FIRST_REACH, LAST_REACH = (
 )  # [half the size] at first, [px] in the end: samples farther off count little
 
 
-class Samples(NamedTuple):
+class OutlinePoints(NamedTuple):
     """Points of outlines with equally many of them."""
 
     points: Floats
@@ -34,9 +34,9 @@ class Samples(NamedTuple):
     weights: Floats
     """By which squared distances count: what a distance costs in the image, shape (outline, sample)."""
 
-    def take(self, rows: npt.NDArray[np.intp]) -> Samples:
+    def take(self, rows: npt.NDArray[np.intp]) -> OutlinePoints:
         """Return those of some outlines."""
-        return Samples(self.points[rows], self.weights[rows])
+        return OutlinePoints(self.points[rows], self.weights[rows])
 
 
 @dataclass(frozen=True)
@@ -126,16 +126,18 @@ class Fits(NamedTuple):
     """Distances of the samples, shape (outline, sample) [px]."""
 
 
-def nearest(family: Family, samples: Samples, begun: Floats | None = None, rounds: int = ROUNDS) -> Fits:
+def nearest(
+    family: Family, samples: OutlinePoints, begun: Floats | None = None, rounds: int = ROUNDS
+) -> Fits:
     """Return the shapes of a family nearest to most of the samples, by weighted least squares.
 
-    Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
+    OutlinePoints far off count little: another shape may hide what is there (Geman and McClure 1987).
 
     ``begun``: values after ``ROUGH_ROUNDS``, shape (outline, value); without, those of the samples' boxes.
     """
     parts = []
     for i in range(0, len(samples.points), TOGETHER):
-        part = Samples(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
+        part = OutlinePoints(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
         if begun is None:
             parts.append(_nearest(family, part, _start(family, part), range(rounds)))
         else:
@@ -143,7 +145,7 @@ def nearest(family: Family, samples: Samples, begun: Floats | None = None, round
     return Fits(*(np.concatenate(own) for own in zip(*parts, strict=True)))
 
 
-def _nearest(family: Family, samples: Samples, values: Floats, rounds: range) -> Fits:
+def _nearest(family: Family, samples: OutlinePoints, values: Floats, rounds: range) -> Fits:
     """Return the nearest shapes of a family from ``values`` on, as ``nearest``."""
     points, weights = samples
     size = _start(family, samples)[:, 2:].max(axis=1)
@@ -174,7 +176,7 @@ def _nearest(family: Family, samples: Samples, values: Floats, rounds: range) ->
     return Fits(values, stiffness, off(values)[0])
 
 
-def _start(family: Family, samples: Samples) -> Floats:
+def _start(family: Family, samples: OutlinePoints) -> Floats:
     """Return centres and sizes from the samples' boxes, shape (outline, value)."""
     low, high = samples.points.min(axis=1), samples.points.max(axis=1)
     center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)

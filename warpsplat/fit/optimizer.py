@@ -9,7 +9,7 @@ import warp as wp
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings
 from warpsplat.kernels import adam
-from warpsplat.rendering.backend import buffer
+from warpsplat.rendering.backend import buffer, view
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.scene import Canvas, Unit
@@ -33,7 +33,9 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
     ``clock``: steps done, on the device, shape (1,).
     """
     if parameters.has_twins:
-        program.launch(adam.tie_twins, parameters.point_count, parameters.arrays)
+        grad = parameters.groups["points"].grad
+        points_grad = view(grad, wp.vec2, grad.shape[:1])
+        program.launch(adam.tie_twins, grad.shape[0], parameters.arrays, points_grad=points_grad)
     if parameters.has_circles:
         from warpsplat.kernels.paint import gradient_kernels  # takes long to import
 

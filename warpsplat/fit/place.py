@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import CLEAR, on, straight
 from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.forms import form_of
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
@@ -145,8 +146,12 @@ class ShapeFactory:
         if settings.kind == Kind.STROKE:
             widths = np.maximum(np.sqrt(areas / STROKE_ASPECT), 1.0)
             return self.place_strokes(centres, areas / widths, widths, angles, colors)
+        basis, count = settings.form
+        if basis.is_form:
+            points = form_of(basis.name).start(centres, areas, angles, count).astype(np.float32)
+            return self._new(Kind.FILL, points, np.zeros(len(centres)), colors)
         radii = np.sqrt(areas / np.pi)
-        if settings.basis == Basis.CUBIC:
+        if basis == Basis.CUBIC:
             points = circle_outlines(centres, radii, settings.chain_cubics)
         else:
             points = circle_splines(centres, radii, settings.spline_points)
@@ -156,8 +161,10 @@ class ShapeFactory:
         self, centres: Floats, lengths: Floats, widths: Floats, angles: Floats, colors: FloatArray
     ) -> Scene:
         """Return straight strokes."""
-        count = MIXED_STROKE_POINTS if self.settings.mixed else self.settings.spline_points
-        if self.settings.basis == Basis.CUBIC:
+        basis, count = self.settings.form
+        if self.settings.mixed:
+            count = MIXED_STROKE_POINTS
+        if basis == Basis.CUBIC:
             count = 3 * STROKE_CUBICS + 1
         direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)
         along = np.maximum(lengths, 2.0)[:, None] * np.linspace(-0.5, 0.5, count)
@@ -170,7 +177,7 @@ class ShapeFactory:
             kind,
             self.canvas,
             points,
-            self.settings.basis,
+            self.settings.form[0],
             colors=np.asarray(colors, np.float32).reshape(len(points), 3),
             opacities=np.full(len(points), opacity, np.float32),
             widths=np.asarray(widths, np.float32),

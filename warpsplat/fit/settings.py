@@ -31,6 +31,10 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
+LossName = Literal["l2", "ssim", "edges"]
+
+LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 1.0}
+"""Weights of what joins the squared error."""
 
 PRESETS: dict[Quality, dict[str, Any]] = {
     "draft": {
@@ -63,6 +67,20 @@ FITTED: tuple[Subject, ...] = ("auto", "photo")
 
 LEVEL_FACTOR, LEAST_LEVEL_SHAPES = 4, 8
 """Shapes of a level over those of the one before if only ``layered`` is asked for, and least of the first."""
+
+CURVE, LINE = "curve", "line"
+"""Names of shapes that are curves, and of straight strokes."""
+
+FORMS = {
+    **{basis.name.lower(): (basis, 0) for basis in Basis if basis.is_form and basis != Basis.POLYGON},
+    **{LINE: (Basis.POLYGON, 2), "triangle": (Basis.POLYGON, 3)},
+}
+"""Forms of shapes by name: the basis, and the number of vertices if it has vertices."""
+
+POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
+
+FORM_POINT_RATE = 3.0
+"""Learning rate of the values of forms [px]."""
 
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
@@ -98,7 +116,8 @@ def parse_density(value: object) -> object:
 
 def parse_basis(value: object) -> object:
     """Return the basis of a name; anything else is left to be checked."""
-    return Basis.__members__.get(value.upper(), value) if isinstance(value, str) else value
+    found = Basis.__members__.get(value.upper()) if isinstance(value, str) else None
+    return value if found is None or found.is_form else found
 
 
 def check_fields(settings: Any, prefix: str = "") -> None:
@@ -151,6 +170,14 @@ class Settings:
             Option(name="open", type=bool, help="Strokes.", value=Kind.STROKE),
         ),
     )
+    shape: str = option(
+        CURVE,
+        "Form of shapes: curve, triangle, rectangle, ellipse, circle, polygon:N, or line, a straight stroke.",
+        pattern=f"{CURVE}|{'|'.join(FORMS)}|polygon:({POLYGON_CORNERS})",
+        wanted=f"one of {', '.join((CURVE, *FORMS))}, or polygon:N with 3 to 64 corners",
+        metavar="FORM",
+        subjects=FITTED,
+    )
     mixed: bool = option(
         False,
         "Fills and strokes together, whichever suits better; in line art, fills for filled areas.",
@@ -177,6 +204,12 @@ class Settings:
         "flat",
         "A flat colour for each shape, a gradient, or whichever is worth its bytes.",
         subjects=FITTED,
+    )
+    loss: LossName = option(
+        "l2",
+        "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
+        subjects=FITTED,
+        refine=True,
     )
     levels: tuple[int, ...] = option(
         (),
@@ -273,7 +306,9 @@ class Settings:
     softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
     gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
-    ssim: float = research(0.0, "Weight of 1 - SSIM: lowers PSNR and SSIMULACRA2.", WEIGHT)
+    loss_weight: float | None = research(
+        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 1 edges"
+    )
     texture: float = research(
         0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION
     )
@@ -307,6 +342,13 @@ class Settings:
             raise UsageError(f"subject {self.subject} and {unsuited[0]} do not go together")
 
     @property
+    def form(self) -> tuple[Basis, int]:
+        """The basis of new shapes, and their number of points if it is a choice."""
+        if self.shape == CURVE:
+            return self.basis, self.spline_points
+        return FORMS.get(self.shape) or (Basis.POLYGON, int(self.shape.partition(":")[2]))
+
+    @property
     def is_limited(self) -> bool:
         """Whether the file may have some colours only."""
         return self.colors is not None or bool(self.palette)
@@ -336,6 +378,16 @@ class Settings:
 
 RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open do not go together"),
+    (lambda s: s.mixed and s.shape != CURVE, "mixed and shape {0.shape} do not go together"),
+    (
+        lambda s: s.shape not in (CURVE, LINE) and s.kind == Kind.STROKE,
+        "shape {0.shape} and open do not go together",
+    ),
+    (lambda s: s.shape == LINE and s.kind == Kind.FILL, "shape line and closed do not go together"),
+    (
+        lambda s: s.shape != CURVE and s.renderer != "exact",
+        "shape {0.shape} and renderer {0.renderer} do not go together",
+    ),
     (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and a palette do not go together"),
     (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
@@ -401,6 +453,8 @@ def expand(given: dict[str, Any]) -> None:
         raise UsageError("closed and open do not go together")
     if closed or is_open or closed is False:
         given["kind"] = Kind.FILL if closed else Kind.STROKE
+    if given.get("shape") == LINE:
+        given.setdefault("kind", Kind.STROKE)
     if given.pop("layered", False):
         given.setdefault("levels", levels_of(given.get("curves", Settings.curves)))
     if given.get("levels"):  # the last of them is the whole
@@ -416,6 +470,8 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
     renderer = given.get("renderer", "exact")
     if renderer != "exact":
         preset = load_renderer(renderer).preset(preset)
+    elif given.get("shape", CURVE) != CURVE:
+        rates["points"] = FORM_POINT_RATE
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if given.get("opaque"):

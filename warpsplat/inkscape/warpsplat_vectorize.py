@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 COMMAND = ["warpsplat"]
-"""What starts warpsplat; set by ``warpsplat inkscape``."""
+"""Arguments that start warpsplat; set by ``warpsplat inkscape``."""
 
 FOLDER = "."
 """Where it is started: the folder that has the package; set by ``warpsplat inkscape``."""

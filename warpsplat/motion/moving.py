@@ -76,6 +76,7 @@ def moving_elements(
         units: width of the canvas in the elements' coordinates.
         static: returns the markup of a scene of shapes that cannot move, such as gradients.
     """
+    scenes = [scene.drawn() for scene in scenes]
     numbers, order = track_shapes(scenes)
     elements: dict[int, list[MovingElement]] = {}
     for key, index in enumerate(keys):

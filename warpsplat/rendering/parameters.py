@@ -16,6 +16,7 @@ from warpsplat.rendering.backend import Backend, view
 from warpsplat.scene import (
     ATTRIBUTES,
     Attribute,
+    Basis,
     Canvas,
     FloatArray,
     IndexArray,
@@ -69,6 +70,7 @@ class Parameters:
 
     def _upload(self, scene: Scene, moments: Moments, ages: np.ndarray) -> None:
         self._scene = scene
+        values, scene = scene, scene.drawn()
         shapes = np.arange(len(scene))
         owner = scene.contour_shapes()
         contours = np.arange(len(owner))
@@ -100,7 +102,7 @@ class Parameters:
         """
         self.has_twins = bool(scene.twin.any())
         if self.has_twins:
-            self.arrays["point_twin"] = self._ints(_twins(scene))
+            self.arrays["point_twin"] = self._ints(_twins(values))
         self.tie_circles(_circular(scene))
         self.parts = tuple(np.unique(parts).tolist())
         """Parts of exact coverage that have shapes."""
@@ -108,15 +110,21 @@ class Parameters:
             self._upload_styles(scene)
         self.broken = self.backend.array(wp.int32, self.shape_count)
         """[shape] 1 where an update met a number that is not finite; it was left out."""
+        value_shape = self.arrays["point_shape"]
+        self.forms: tuple[Basis, ...] = ()
+        """The bases of the shapes if some are forms, of which ``rendering.forms`` computes control points."""
+        if values.forms():
+            self.forms = tuple(map(Basis, np.unique(values.basis).tolist()))
+            value_shape = self._ints(np.repeat(shapes, values.point_counts()))
         owners = {
-            "point": self.arrays["point_shape"],
+            "point": value_shape,
             "shape": self._ints(shapes),
             "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
         }
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
             value, m1, m2 = (
-                self._floats(x, a) for x in (getattr(scene, a.name), moments[0][a.name], moments[1][a.name])
+                self._floats(x, a) for x in (getattr(values, a.name), moments[0][a.name], moments[1][a.name])
             )
             held = self.backend.array(wp.int32, value.shape[0])
             group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per], held)
@@ -124,6 +132,16 @@ class Parameters:
             rows = (value.shape[0],)
             self.arrays[a.name] = view(group.value, ELEMENTS[a.size], rows)
             self.arrays[f"{a.name}_grad"] = view(group.grad, ELEMENTS[a.size], rows)
+        if self.forms:
+            self.arrays |= {
+                "values": self.arrays["points"],
+                "values_grad": self.arrays["points_grad"],
+                "value_first": self._ints(values.first),
+                "value_shape": value_shape,
+                "form": self._ints(values.basis),
+                "points": self.backend.array(wp.vec2, self.point_count),
+                "points_grad": self.backend.array(wp.vec2, self.point_count),
+            }
 
     def tie_circles(self, rows: np.ndarray) -> None:
         """Keep the gradients of the shapes ``rows`` (true or 1) circular from now on."""
@@ -141,7 +159,8 @@ class Parameters:
         for name, group in part.groups.items():
             rows, size = group.value.shape
             group.value = view(self.groups[name].value, wp.float32, (rows, size))
-            part.arrays[name] = view(group.value, ELEMENTS[size], (rows,))
+            bound = "values" if part.forms and name == "points" else name
+            part.arrays[bound] = view(group.value, ELEMENTS[size], (rows,))
         return part
 
     def _upload_styles(self, scene: Scene) -> None:
@@ -167,6 +186,11 @@ class Parameters:
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes in the scene."""
         return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+
+    @property
+    def curves(self) -> bool:
+        """Whether some shapes are curves, rather than forms."""
+        return not all(basis.is_form for basis in self.forms) or not self.forms
 
     @property
     def paints(self) -> frozenset[Paint]:

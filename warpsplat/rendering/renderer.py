@@ -13,6 +13,7 @@ from warpsplat.kernels import composite, constants
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins, StageInputs
 from warpsplat.rendering.film import Film
+from warpsplat.rendering.forms import record_gather, record_place
 from warpsplat.rendering.memory import check_memory
 from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.paint import Painting
@@ -126,6 +127,7 @@ class Renderer:
 
     def _record_forward(self, program: Program) -> None:
         program.stage = "outline"
+        record_place(program, self.parameters)  # values -> points, where there are forms
         self.geometry.forward(program)  # points, widths -> samples
         program.stage = "bins"
         self.bins.forward(program, self.geometry.samples())  # samples -> slots, sorted by tile
@@ -148,6 +150,7 @@ class Renderer:
         self.film.backward(program)  # image_grad -> by slot
         self.paint.backward(program)  # -> colours, opacities
         self.coverage.backward(program)  # -> samples -> points, widths
+        record_gather(program, self.parameters)  # -> values
 
     def bytes(self) -> int:
         """Return the memory of all arrays that the programs work on [bytes]."""

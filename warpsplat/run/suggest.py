@@ -50,7 +50,7 @@ ROUNDING_SHARE = 0.05
 """Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
 
 SIMPLER = ", and --detail how small they may be"
-"""What else can be chosen for a drawing."""
+"""Ending of a suggestion for a drawing."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,16 @@ class Basis(IntEnum):
     SPLINE = constants.SPLINE
     """A uniform quadratic B-spline: each point is the control point of one quadratic Bézier, which begins and
     ends midway to the neighbouring points. An open one begins and ends at its first and last point."""
+    POLYGON = 2
+    """This and those below are forms (``warpsplat.forms``), whose control points are computed: vertices."""
+    CIRCLE = 3
+    ELLIPSE = 4
+    RECTANGLE = 5
+
+    @property
+    def is_form(self) -> bool:
+        """Return whether points are the values of a form, rather than control points."""
+        return self > Basis.SPLINE
 
 
 class Rule(IntEnum):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.forms import form_of
 from warpsplat.portable.linear import product
 from warpsplat.scene.attributes import Basis, Kind
 from warpsplat.scene.scene import FloatArray, Scene
@@ -20,6 +21,8 @@ ARC_HANDLE = 4 * (math.sqrt(2) - 1) / 3
 
 def beziers(points: FloatArray, closed: bool, basis: Basis) -> FloatArray:
     """Return contours of equal length as cubics: (contour, point, 2) -> (contour, Bézier, 4, 2)."""
+    if basis.is_form:
+        points, basis = form_of(basis.name).outline(points, closed), Basis.CUBIC
     if basis == Basis.CUBIC:
         count = points.shape[1]
         starts = np.arange(0, count - (not closed), 3)

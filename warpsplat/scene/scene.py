@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.forms import form_of
 from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
 
 FloatArray = npt.NDArray[np.float32]
@@ -65,7 +66,8 @@ class Scene:
     array: those of contour ``c`` from ``starts[c]`` to ``starts[c + 1]``, those of shape ``i`` from
     ``first[i]`` to ``first[i + 1]``; ``basis`` gives their meaning. Those of a closed contour are a ring: the
     last cubic ends at point 0, a spline has a quadratic for each point. Those of an open contour are a chain:
-    cubics need one point more, a spline has two points more than quadratics.
+    cubics need one point more, a spline has two points more than quadratics. A shape of a form has one
+    contour, and its points are the values from which control points are computed (``drawn``).
 
     Below, "shape (shape, 3)" is an array with a row for each shape and three columns.
 
@@ -177,6 +179,11 @@ class Scene:
         owner = self.contour_shapes()
         odd = counts % 3 != np.where(self.closed, 0, 1)
         wrong = (counts < 3) | ((self.basis[owner] == Basis.CUBIC) & odd)
+        for basis in self.forms():
+            own, values = self.basis[owner] == basis, form_of(basis.name).VALUES
+            impossible = counts != values if values else counts < np.where(self.closed, 3, 2)
+            alone = np.bincount(owner, minlength=len(self))[owner] == 1
+            wrong = np.where(own, impossible | ~alone, wrong)
         if wrong.any():
             bad = int(np.flatnonzero(wrong)[0])
             name = Kind(self.kind[owner[bad]]).name.lower()
@@ -233,6 +240,33 @@ class Scene:
         spline = np.where(self.closed, counts, counts - 2)
         cubics = self.basis[self.contour_shapes()] == Basis.CUBIC
         return np.where(cubics, counts // 3, spline).astype(np.int32)
+
+    def forms(self) -> tuple[Basis, ...]:
+        """Return the forms that some shapes have."""
+        return tuple(Basis(basis) for basis in np.unique(self.basis).tolist() if Basis(basis).is_form)
+
+    def drawn(self) -> Scene:
+        """Return the scene with the shapes of forms as cubics; itself if there are none."""
+        if not self.forms():
+            return self
+        counts, groups = np.diff(self.starts), []
+        for group in self.alike():
+            points = group.points
+            if group.basis.is_form:
+                points = form_of(group.basis.name).outline(points, group.closed)
+            groups.append((group.contours, points))
+            counts[group.contours] = points.shape[1]
+        starts = starts_of(counts)
+        points = np.empty((starts[-1], 2), np.float32)
+        for contours, own in groups:
+            points[starts[contours][:, None] + np.arange(own.shape[1])] = own
+        return replace(
+            self,
+            basis=np.where(self.basis > Basis.SPLINE, Basis.CUBIC, self.basis).astype(np.int32),
+            first=starts[np.searchsorted(self.starts, self.first)],
+            starts=starts,
+            points=points,
+        )
 
     def bezier_counts(self) -> IntArray:
         """Return the number of Béziers of each shape, shape (shape,)."""

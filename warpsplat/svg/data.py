@@ -22,6 +22,7 @@ from warpsplat.svg.commands import (
     shortest_ring,
     shortest_smooth,
 )
+from warpsplat.svg.forms import held_values
 from warpsplat.svg.primitives import held_primitives, primitives
 
 
@@ -68,6 +69,8 @@ def held_points(scene: Scene, exact: Floats) -> Floats:
     held[rows[:, 1]], held[rows[:, 2]] = (2 * a + b) / 3, (a + 2 * b) / 3
     for own, points in held_primitives(scene, exact):
         held[own] = points
+    for rows, values in held_values(scene, exact):
+        held[rows] = values
     return held
 
 

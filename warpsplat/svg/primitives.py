@@ -23,7 +23,7 @@ NEAR = 0.01
 is as coarse. Those of other outlines lie on whole numbers, where the handles of arcs hardly ever do."""
 
 POINT_COUNTS = (12, 18, 24)
-"""Of four arcs or lines, of four arcs and two lines, and of four of each."""
+"""Numbers of points of outlines of four arcs or lines, of four arcs and two lines, and of four of each."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Primitive:
     low: tuple[float, float]
     high: tuple[float, float]
     radii: tuple[float, float]
-    """Of the corners."""
+    """Radii of the corners."""
     is_clockwise: bool = True
     """Whether it runs from x towards y, which is clockwise on a screen."""
 

@@ -34,6 +34,7 @@ from warpsplat.scene.scene import IntArray, starts_of
 from warpsplat.svg.clip import polygon
 from warpsplat.svg.document import Document, name_of
 from warpsplat.svg.excerpts import Excerpts
+from warpsplat.svg.forms import read_form
 from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.inspect import NAMESPACE, svg_size
 from warpsplat.svg.paints import unused
@@ -55,19 +56,30 @@ def _ring(subpath: Subpath) -> Points:
     return points[:-1]
 
 
-def _outlines(shapes: list[Shape]) -> Iterator[_Outline]:
+def _outlines(shapes: list[Shape], forms: bool) -> Iterator[_Outline]:
     """Yield the points of shapes, the same for twins. Contours that are only filled are closed."""
     twins = [shape.is_twin for shape in shapes] + [False]
     for shape, *is_twin in zip(shapes, twins[:-1], twins[1:], strict=True):
         is_stroked = shape.line is not None or any(is_twin)
         closed = [subpath.is_closed or not is_stroked for subpath in shape.subpaths]
         pairs = list(zip(shape.subpaths, closed, strict=True))
+        form = None
+        if forms and len(pairs) == 1 and not any((shape.is_twin, *is_twin)):
+            form = read_form(shape.tag, _points(*pairs[0]), closed[0])
+        if form:
+            yield form[0], [form[1]], closed
+            continue
         splines = [subpath.spline_ring() if ring else subpath.spline_chain() for subpath, ring in pairs]
         contours = [spline for spline in splines if spline is not None]
         if len(contours) == len(splines):
             yield Basis.SPLINE, contours, closed
         else:
-            yield Basis.CUBIC, [_ring(subpath) if ring else subpath.points for subpath, ring in pairs], closed
+            yield Basis.CUBIC, [_points(*pair) for pair in pairs], closed
+
+
+def _points(subpath: Subpath, closed: bool) -> Points:
+    """Return the points of a contour of cubics."""
+    return _ring(subpath) if closed else subpath.points
 
 
 def _is_background(shape: Shape, width: int, height: int) -> bool:
@@ -98,9 +110,9 @@ def load_scene(
 
 
 def scene_of(
-    shapes: list[Shape], width: int, height: int, background_apart: bool = True
+    shapes: list[Shape], width: int, height: int, background_apart: bool = True, forms: bool = False
 ) -> tuple[Scene, bool]:
-    """Return shapes as a scene, and whether the first of them is its background; as ``load_scene``."""
+    """Return shapes as a scene, and whether the first of them is its background; as ``load_kept``."""
     background = np.ones(3)
     has_background = (
         background_apart
@@ -111,7 +123,7 @@ def scene_of(
     if has_background:
         background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # _is_background has checked
         shapes = shapes[1:]
-    bases, rings, closed = zip(*_outlines(shapes), strict=True) if shapes else ((), (), ())
+    bases, rings, closed = zip(*_outlines(shapes, forms), strict=True) if shapes else ((), (), ())
     contours = list(chain.from_iterable(rings))
     counts = np.array([sum(map(len, own)) for own in rings], np.int32)
     styles = {dashes: i for i, dashes in enumerate(sorted({s.line.dashes for s in shapes if s.line} - {()}))}
@@ -209,9 +221,18 @@ class KeptScene:
 
 
 def load_kept(
-    text: str, width: int, height: int, name: str, *, background_apart: bool = True, keep: bool = True
+    text: str,
+    width: int,
+    height: int,
+    name: str,
+    *,
+    background_apart: bool = True,
+    keep: bool = True,
+    forms: bool = False,
 ) -> KeptScene:
     """Read an SVG as ``load_scene`` does, but ``keep`` elements that it refuses, as pictures.
+
+    ``forms``: whether circles, polygons ... are forms (``warpsplat.forms``), rather than curves.
 
     Raises:
         ImageError: Not an SVG, no part that shapes can hold, or something that cannot be kept either.
@@ -222,7 +243,7 @@ def load_kept(
         shapes = _with_pictures(parts, kept, text, document, (width, height)) if kept else shapes_of(parts)
         if not shapes and not keep:
             raise ImageError("draws no filled or stroked path")
-        scene, has_background = scene_of(shapes, width, height, background_apart)
+        scene, has_background = scene_of(shapes, width, height, background_apart, forms)
         if (scene.paint == Paint.PICTURE).all():
             causes = f": {_in_words(kept)}" if kept else ""
             raise ImageError(f"contains no path to refine{causes}")

@@ -63,6 +63,8 @@ class Shape:
     """Name of its level in a layered file."""
     element: Element | None = None
     """The element that draws it, if that can be kept in its place."""
+    tag: str = ""
+    """Name of that element."""
 
     known_box: list[Points] = field(default_factory=list, repr=False, compare=False)
     """Cache of ``box``, shared by copies with the same outline."""
@@ -118,11 +120,13 @@ def element_shapes(element: Element, document: Document, place: Placement) -> li
     if fill:
         rule = Rule.EVENODD if style["fill-rule"] == "evenodd" else Rule.NONZERO
         upright = tag == "rect" and len(own[0].points) == 13
-        shapes.append(Shape(subpaths, fill, fraction(style["fill-opacity"]), None, rule, is_rect=upright))
+        shapes.append(
+            Shape(subpaths, fill, fraction(style["fill-opacity"]), None, rule, is_rect=upright, tag=tag)
+        )
     if stroke and line:
         if similarity(place.matrix) is None:
             raise ImageError("a stroke that a transform stretches is not supported")
-        shapes.append(Shape(subpaths, stroke, fraction(style["stroke-opacity"]), line))
+        shapes.append(Shape(subpaths, stroke, fraction(style["stroke-opacity"]), line, tag=tag))
     if len(shapes) == 2:
         if _strokes_first(style["paint-order"]):
             shapes.reverse()

@@ -17,6 +17,7 @@ from warpsplat.scene import ATTRIBUTES, NO_DASHES, Basis, Cap, Join, Kind, Paint
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import held_points, path_data, units
+from warpsplat.svg.forms import form_elements
 from warpsplat.svg.groups import LEVEL_ID, Names, PathElement, color_names, nested, painted
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import hex_colors, number
@@ -97,8 +98,8 @@ class _Paths:
             symbols: Elements without style, by shape, instead of paths.
         """
         self._scene, self._per_pixel = scene, per_pixel
-        self._data = list(path_data(scene, per_pixel))
-        self._elements = _basic_shapes(scene, per_pixel) | (symbols or {})
+        self._data = list(path_data(scene.drawn(), per_pixel))
+        self._elements = _basic_shapes(scene, per_pixel) | form_elements(scene, per_pixel) | (symbols or {})
         self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
@@ -125,7 +126,7 @@ class _Paths:
             own += "" if self._scene.kind[twin] == Kind.STROKE else ' paint-order="stroke"'
         style = self._style(shape, in_group=in_group)
         if self._scene.kind[shape] == Kind.STROKE:
-            return PathElement(self._data[shape], (opacity, paint, style), own)
+            return PathElement(self._data[shape], (opacity, paint, style), own, self._elements.get(shape, ""))
         shared = (opacity, "" if paint == BLACK_FILL else paint, "")
         return PathElement(self._data[shape], shared, style + own, self._elements.get(shape, ""))
 

@@ -1,0 +1,57 @@
+"""Elements of forms: written from their values, and read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from warpsplat.forms import form_of
+from warpsplat.scene import Basis, IndexArray, Scene
+from warpsplat.svg.paths import Points
+
+NEAR = 0.01
+"""Largest distance of a form's control points from those of the element that it is read from [px]."""
+
+
+def held_values(scene: Scene, exact: Points) -> Iterator[tuple[IndexArray, Points]]:
+    """Yield the rows of forms' values, shape (shape, value), and the values that their elements have.
+
+    ``exact``: the scene's points in units of the file, shape (point, 2).
+    """
+    for group in scene.alike():
+        if group.basis.is_form:
+            form = form_of(group.basis.name)
+            rows = scene.starts[group.contours][:, None] + np.arange(group.points.shape[1])
+            yield rows, form.values(form.numbers(exact[rows]))
+
+
+def form_elements(scene: Scene, per_pixel: float) -> dict[int, str]:
+    """Return the elements, without style, of the shapes that are forms."""
+    found = {}
+    for group in scene.alike():
+        if group.basis.is_form:
+            form = form_of(group.basis.name)
+            numbers = form.numbers(group.points.astype(np.float64) * per_pixel).tolist()
+            elements = [form.element(own, group.closed) for own in numbers]
+            found.update(zip(group.shapes.tolist(), elements, strict=True))
+    return found
+
+
+def read_form(tag: str, points: Points, closed: bool) -> tuple[Basis, Points] | None:
+    """Return the form of an element, and its values; None if it has none, or is stretched or rounded.
+
+    ``points``: control points of its outline, of a ring without the repeated end.
+    """
+    for basis in Basis:
+        if not basis.is_form or tag not in form_of(basis.name).TAGS:
+            continue
+        form = form_of(basis.name)
+        count = form.VALUES or len(points[::3])
+        if len(points) != form.drawn(count, closed):
+            return None
+        values = form.read(points, closed)
+        return (
+            (basis, values) if np.allclose(form.outline(values[None], closed)[0], points, 0, NEAR) else None
+        )
+    return None
