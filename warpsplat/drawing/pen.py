@@ -89,15 +89,16 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     quiet = replace(run, on_progress=None, checkpoint=None)
     problem = Problem(shown, replace(line_settings(settings, len(traced)), iterations=STEPS))
     strokes = _clean(fit(problem, quiet, Start(scene=traced)).scene)
-    count, parts = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     # What a part covers of the pixels beside its mask belongs to it.
-    parts = cv2.dilate(parts.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.intp)
+    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
+    parts: IndexArray = np.asarray(grown, np.intp)
     part, outline_part = _parts_of(parts, count, strokes), _parts_of(parts, count, alone)
     lengths = _lengths(strokes)
     pieces = (np.diff(strokes.starts) - 1 + strokes.closed) // 3
-    length, area, curves = (
-        np.bincount(part, own, count) for own in (lengths, lengths * strokes.widths, pieces)
-    )
+    length: Floats = np.bincount(part, lengths, count).astype(np.float64)
+    area = np.bincount(part, lengths * strokes.widths, count)
+    curves = np.bincount(part, pieces, count)
     before = np.bincount(outline_part, np.diff(alone.starts) // 3, count)
     off = render(strokes, backend=run.backend)[..., 0] - shown[..., 0]
     gone = _are_near(parts, off, length) & (length * length > LONG * area) & (curves <= before)

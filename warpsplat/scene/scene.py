@@ -317,9 +317,11 @@ class Scene:
     def alike(self) -> Iterator[Alike]:
         """Yield contours grouped by kind, basis, closedness and number of points."""
         owner, counts = self.contour_shapes(), np.diff(self.starts)
-        keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts], axis=1)
-        for kind, basis, closed, count in sorted(set(map(tuple, keys.tolist()))):
-            index = np.flatnonzero((keys == (kind, basis, closed, count)).all(axis=1))
+        keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts])
+        order = np.lexsort(keys[::-1])
+        ends = np.flatnonzero((np.diff(keys[:, order]) != 0).any(axis=0)) + 1
+        for index in np.split(order, ends) if len(order) else ():
+            kind, basis, closed, count = keys[:, index[0]].tolist()
             points = self.points[self.starts[index][:, None] + np.arange(count)]
             yield Alike(Kind(kind), Basis(basis), bool(closed), owner[index], index, points)
 
