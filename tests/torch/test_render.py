@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,13 +16,13 @@ import torch
 
 from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
-from warpsplat.errors import UsageError
+from warpsplat.errors import ResourceError, UsageError
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.torch import SceneTensors, over, render
+from warpsplat.torch import Module, SceneTensors, over, render, tensors
 
 FILL = Kind.FILL
 
@@ -149,6 +150,23 @@ def test_several_threads_find_what_one_finds(threads: int) -> None:
                 assert_equal(gradient, want)
 
 
+def test_a_scene_is_drawn_as_its_tensors_are() -> None:
+    scene = random_scene(FILL)
+    assert_equal(render(scene), render(SceneTensors.of(scene)))
+    assert_equal(render([scene, moved(scene, 1.0)])[0], render(scene))
+
+
+def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tensors, "_warn_of_float64", functools.cache(tensors._warn_of_float64.__wrapped__))
+    scene = moved(random_scene(FILL), 0.0)
+    double = scene.values["points"].detach().double().requires_grad_()
+    with pytest.warns(UserWarning, match="float32"):
+        render(SceneTensors(scene.layout, {"points": double}))
+    (gradient,) = torch.autograd.grad(loss_of(SceneTensors(scene.layout, {"points": double})), [double])
+    assert gradient.dtype == torch.float64
+    assert_equal(gradient.float(), points_grad(loss_of(scene), scene))
+
+
 def test_over() -> None:
     scene = random_scene(FILL)
     clear = render(SceneTensors.of(replace(scene, canvas=Canvas(40, 36, None))))
@@ -178,7 +196,7 @@ def values(**changed: Any) -> Callable[[], object]:
 REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
     "no attribute 'colour'": (ValueError, values(colour=torch.zeros(4))),
     r"colors has shape \(3,\), not \(4, 3\)": (ValueError, values(colors=torch.zeros(3).float())),
-    "colors is torch.float64": (TypeError, values(colors=torch.zeros(4, 3).double())),
+    "colors is torch.float16": (TypeError, values(colors=torch.zeros(4, 3).half())),
     "colors is a ndarray": (TypeError, values(colors=np.zeros((4, 3), np.float32))),
     "colors is on meta": (
         ValueError,
@@ -191,6 +209,16 @@ REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
     "not 'fast'": (UsageError, refused(renderer="fast")),
     "is a spline": (ValueError, refused(renderer="splat")),
     "no scene": (UsageError, lambda: render([])),
+    "take about .* GB": (ResourceError, refused(width=400_000, height=360_000)),
+    "threads must be a whole number from 1, not 'a'": (UsageError, refused(threads="a")),
+    "threads must be a whole number from 1, not 0": (UsageError, refused(threads=0)),
+    "tensors are on meta": (UsageError, values(opacities=torch.ones(4, device="meta").float())),
+    "as in module": (TypeError, lambda: render(Module(SPLINES))),
+    "not str": (TypeError, lambda: render("<svg")),
+    "list of them, not int": (TypeError, lambda: render([SPLINES, 3])),  # type: ignore[list-item]
+    "needed, not str: warpsplat.load_svg": (TypeError, lambda: SceneTensors.of("<svg/>")),
+    r"give its scene\(\)": (TypeError, lambda: Module(SceneTensors(SPLINES, {}))),
+    "the layout is a str": (TypeError, lambda: SceneTensors("<svg/>", {})),
 }
 
 

@@ -76,8 +76,7 @@ def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backen
 
     Raises ``UsageError`` at once for an unknown device.
     """
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
+    check_threads(threads)
     with ExitStack() as held:
 
         @functools.cache
@@ -94,3 +93,9 @@ def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backen
         if device not in ALWAYS_THERE:
             started()
         yield started
+
+
+def check_threads(threads: int | None) -> None:
+    """Raise ``UsageError`` unless a number of threads is a whole number from 1, or None."""
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
