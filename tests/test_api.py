@@ -232,7 +232,9 @@ def test_what_is_public_is_there_and_light() -> None:
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
     public |= {
-        name for name, home in {"report": "pages", "Recorder": "motion"}.items() if home in extensions()
+        name
+        for name, home in {"report": "pages", "Recorder": "motion", "load_preset": "batch"}.items()
+        if home in extensions()
     }
     assert set(warpsplat.__all__) == public == set(dir(warpsplat))
     for name in public:
