@@ -23,6 +23,7 @@ from warpsplat._version import __version__ as __version__
 from warpsplat.extensions import declared
 
 if TYPE_CHECKING:
+    from warpsplat.batch.presets import load_preset as load_preset
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError

@@ -80,8 +80,8 @@ FORMS = {
 
 POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
 
-FORM_POINT_RATE = 3.0
-"""Learning rate of the values of forms [px]."""
+FORM_POINT_RATE, FORM_SURPLUS = 6.0, 2.0
+"""Learning rate of the values of forms [px], and their ``Density.surplus``."""
 
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
@@ -474,6 +474,8 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
         preset = load_renderer(renderer).preset(preset)
     elif given.get("shape", CURVE) != CURVE:
         rates["points"] = FORM_POINT_RATE
+        density = replace(preset.density, surplus=FORM_SURPLUS)
+        preset = replace(preset, texture=0.0, density=density)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if given.get("opaque"):
