@@ -33,7 +33,7 @@ class LossBuffers:
     similarity: wp.array = buffer(wp.float32, "tiles", 3, "lanes")
     """SSIM x weight."""
     edges: wp.array = buffer(wp.float32, "tiles", "planes", "lanes")
-    """Squared differences of neighbours' errors x weight."""
+    """Squared slopes of the error x weight."""
 
 
 def pixel_lanes(backend: Backend) -> int:
@@ -177,17 +177,13 @@ def _launch_edges(program: Program, inputs: LossInputs, weight: float) -> None:
     renderer, target = inputs.renderer, inputs.target
     film, viewport, backend = renderer.film, renderer.viewport, renderer.backend
     lanes = pixel_lanes(backend)
-    program.launch(
-        edges.make_edge_loss(backend.column),
-        (viewport.tile_count, film.planes, lanes),
-        film.buffers,
-        target,
-        target.buffers,
-        viewport,
-        lane_columns=backend.columns // lanes,
-        edge_weight=weight,
-        split=True,
-    )
+    dim = (viewport.tile_count, film.planes, lanes)
+    across, down = (backend.array(backend.column, *film.buffers.image.shape) for _ in range(2))
+    values = {"across_grad": across, "down_grad": down, "lane_columns": backend.columns // lanes}
+    sources = (film.buffers, target, target.buffers, viewport)
+    slopes, backward = edges.make_edge_slopes(backend.column), edges.make_edge_backward(backend.column)
+    program.launch(slopes, dim, *sources, values, edge_weight=weight, split=True)
+    program.launch(backward, dim, *sources, values, split=True)
 
 
 def _launch_custom(program: Program, inputs: LossInputs, weight: float) -> None:
@@ -238,7 +234,7 @@ IMAGE_LOSSES: tuple[Loss, ...] = (
     Loss(
         weight=lambda inputs: weight_of("edges", inputs),
         launch=_launch_edges,
-        reason="Differences of neighbouring pixels: edges and texture count more than even colours.",
+        reason="Slopes of the error: outlines that are as sharp, and run, as those of the image.",
         value=lambda inputs: inputs.target.mean(inputs.target.buffers.edges),
     ),
     Loss(

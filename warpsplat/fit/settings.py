@@ -14,6 +14,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
+from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     Option,
     nearest,
@@ -33,7 +34,7 @@ Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 LossName = Literal["l2", "ssim", "edges"]
 
-LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 1.0}
+LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 3.0}
 """Weights of what joins the squared error."""
 
 PRESETS: dict[Quality, dict[str, Any]] = {
@@ -79,8 +80,8 @@ FORMS = {
 
 POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
 
-FORM_POINT_RATE = 3.0
-"""Learning rate of the values of forms [px]."""
+FORM_POINT_RATE, FORM_SURPLUS = 6.0, 2.0
+"""Learning rate of the values of forms [px], and their ``Density.surplus``."""
 
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
@@ -149,6 +150,7 @@ class Density:
         check_fields(self, "density ")
 
 
+@described
 @dataclass(frozen=True)
 class Settings:
     """Everything but the image that decides the result. Fields without help are set by other options."""
@@ -275,6 +277,10 @@ class Settings:
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
+    strokes: bool = option(
+        False,
+        "Of drawings: what a round pen draws in even width becomes strokes; drafts have none.",
+    )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )
@@ -303,7 +309,7 @@ class Settings:
     gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
     loss_weight: float | None = research(
-        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 1 edges"
+        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 3 edges"
     )
     texture: float = research(
         0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION
@@ -468,6 +474,8 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
         preset = load_renderer(renderer).preset(preset)
     elif given.get("shape", CURVE) != CURVE:
         rates["points"] = FORM_POINT_RATE
+        density = replace(preset.density, surplus=FORM_SURPLUS)
+        preset = replace(preset, texture=0.0, density=density)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if given.get("opaque"):

@@ -119,7 +119,7 @@ def serialize(
     widths = [id(shape.stroke_width) for shape in shapes]
     structures = []
     for number, group in enumerate(groups):
-        name, ids = f"group {number}", [int(i) for i in group.shape_ids.tolist()]
+        name, ids = f"group {number}", _list(group.shape_ids)
         for i in ids:
             if not 0 <= i < len(shapes):
                 raise UsageError(f"{name} names shape {i}, there are {len(shapes)}")
@@ -152,10 +152,20 @@ class _Tensors:
         at, self._next = self._next, self._next + value.numel()
         return at
 
+    def add_widths(self, value: Tensor, points: int, name: str) -> int:
+        """Collect a tensor with a number for each point, and maybe more."""
+        surplus = isinstance(value, Tensor) and value.dim() == 1 and len(value) > points
+        return self.add(value, (-1,) if surplus else (points,), name)
+
     def add_number(self, value: Tensor, name: str) -> int:
         """Collect a tensor that holds one number, in any shape."""
         is_number = isinstance(value, Tensor) and value.numel() == 1
         return self.add(value, tuple(value.shape) if is_number else (), name)
+
+
+def _list(values: Tensor | Sequence[int]) -> list[int]:
+    """Return whole numbers, which programs give as a tensor, an array or a list."""
+    return [int(i) for i in (values.tolist() if hasattr(values, "tolist") else values)]
 
 
 def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
@@ -179,7 +189,7 @@ def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
     points = sum(counts) + len(counts) + (not closed)
     width, name = shape.stroke_width, f"stroke_width of {name}"
     tapers = isinstance(width, Tensor) and width.numel() != 1
-    at = tensors.add(width, (points,), name) if tapers else tensors.add_number(width, name)
+    at = tensors.add_widths(width, points, name) if tapers else tensors.add_number(width, name)
     return ShapeStructure(kind, counts, closed, points, tapers, first, at)
 
 
@@ -189,9 +199,9 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
     if isinstance(shape, Polygon):
         counts = (0,) * (points - is_open)
     else:
-        counts = tuple(map(int, shape.num_control_points.tolist()))
+        counts = tuple(_list(shape.num_control_points))
     wanted = sum(counts) + len(counts) + is_open
-    if not counts or not {0, 1, 2}.issuperset(counts) or wanted != points:
+    if not counts or not {0, 1, 2}.issuperset(counts) or wanted > points:
         raise UsageError(
             f"{name} has {points} points, its num_control_points {list(counts)} ask for {wanted}"
         )
@@ -217,7 +227,7 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     if color is None:
         return None
     if isinstance(color, Tensor):
-        return PaintStructure(Paint.FLAT, 0, tensors.add(color, (4,), name))
+        return PaintStructure(Paint.FLAT, 0, tensors.add(color, (4, 1) if color.dim() == 2 else (4,), name))
     if isinstance(color, LinearGradient):
         kind, points = Paint.LINEAR, {"begin": color.begin, "end": color.end}
     elif isinstance(color, RadialGradient):
@@ -253,10 +263,10 @@ def _numbers(
         yield tensor.shape
     for shape in shapes:
         if isinstance(shape, Path):
-            yield shape.num_control_points.tolist()
+            yield _list(shape.num_control_points)
     for group in groups:
         matrix = group.shape_to_canvas
-        yield group.shape_ids.tolist()
+        yield _list(group.shape_ids)
         yield matrix.tolist()
         yield matrix.requires_grad
 
