@@ -71,7 +71,8 @@ def opaque_results() -> Iterator[Arrays]:
     """Render opaque shapes; yield gradients."""
     plain = mixed_scene(seed=1)
     painted = replace(with_gradients(mixed_scene(seed=2)), canvas=Canvas(40, 36, None))
-    for scene, straight in ((plain, False), (painted, False), (painted, True)):
+    clear = replace(plain, canvas=painted.canvas)
+    for scene, straight in ((plain, False), (painted, False), (clear, True), (painted, True)):
         renderer = renderer_for(scene, "cpu", threads=THREADS, opaque=True, straight=straight)
         renderer.write_image_grad(np.random.default_rng(0).normal(size=renderer.read_image().shape))
         renderer.backward()
