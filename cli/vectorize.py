@@ -34,6 +34,12 @@ from warpsplat.run.options import settings_from
     " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
+@click.option(
+    "--preset",
+    metavar="NAME",
+    help="Options of a style: brush, ink, low-poly, placeholder, poster, stained-glass, or of a YAML file;"
+    " options beside it count more.",
+)
 @quality_options(several=True)
 @importance_option
 @checkpoint_options
@@ -48,6 +54,7 @@ def command(
     images: tuple[Path, ...],
     as_uri: bool,
     suggest: bool,
+    preset: str | None,
     checkpoint: Path | None,
     resume: bool,
     checkpoint_every: str,
@@ -61,6 +68,11 @@ def command(
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
     hooks = Hooks("vectorize", given)
+    if preset is not None:
+        with_preset = declared("provides").get("with_preset")
+        if with_preset is None:
+            raise UsageError("presets need the extension batch, which is not installed")
+        given = load(with_preset)(preset, given)
     numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
     request = Request.taken(images[0], given)
     if suggest:

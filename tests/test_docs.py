@@ -121,7 +121,14 @@ def test_files_of_links_are_there(page: Path) -> None:
             assert made or (page.parent / link).exists(), link
 
 
-MADE = {"architecture.md", "changelog.md", "contributing.md", "commands.md", "gallery/index.md"}
+MADE = {
+    *(f"notebooks/{path.stem}.md" for path in ROOT.glob("examples/*.ipynb")),
+    "architecture.md",
+    "changelog.md",
+    "contributing.md",
+    "commands.md",
+    "gallery/index.md",
+}
 """Pages that the site makes."""
 
 

@@ -468,7 +468,7 @@ def slopes_beside(
     ``vertices``: the shape's, first and last. Where the edge goes down, its first side is the left one: there
     the winding number is about to be one more.
     """
-    aside = (BESIDE / wp.length(d)) * wp.vec2(-d[1], d[0])
+    aside = (BESIDE / (wp.abs(d[0]) + wp.abs(d[1]))) * wp.vec2(-d[1], d[0])
     before = int(0)
     after = int(0)
     for j in range(vertices[0], vertices[1]):
@@ -503,6 +503,12 @@ def gradient_at(
 
 
 @wp.func
+def is_upright(d: wp.vec2) -> wp.bool:
+    """Return whether an edge that lies on a border of pixels lies on an upright one."""
+    return wp.abs(d[1]) >= wp.abs(d[0])
+
+
+@wp.func
 def sums_along_border(
     sum_grad: wp.array2d[wp.float32],
     slot_state: wp.array[wp.int32],
@@ -521,7 +527,7 @@ def sums_along_border(
 
     ``start``: where the edge begins; ``corner``: that of the shape's tiles; see ``gradient_at`` for others.
     """
-    upright = on_border(start[0], start[0] + d[0])
+    upright = is_upright(d)
     border = int(wp.floor(wp.where(upright, start[0] - corner[0], start[1] - corner[1]) + 0.5))
     a = wp.where(upright, start[1] - corner[1], start[0] - corner[0])
     length = wp.where(upright, d[1], d[0])
@@ -594,7 +600,8 @@ def fill_backward(
         a = start - corner
         sums = wp.vec2(0.0, 0.0)
         vertices = wp.vec2i(vertex_first[shape], vertex_last[shape])
-        if on_border(start[0], start[0] + d[0]) or on_border(start[1], start[1] + d[1]):
+        along = wp.where(is_upright(d), 0, 1)
+        if on_border(start[along], start[along] + d[along]):
             size = wp.vec2i(wide, high)
             sums = sums_along_border(
                 sum_grad,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import subprocess
 import sys
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -16,13 +15,12 @@ import torch
 
 from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
-from warpsplat.errors import ResourceError, UsageError
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.torch import Module, SceneTensors, over, render, tensors
+from warpsplat.torch import SceneTensors, over, render, tensors
 
 FILL = Kind.FILL
 
@@ -180,51 +178,3 @@ def test_without_torch_one_line_says_what_to_do() -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
     assert done.stderr.splitlines()[-1] == message
-
-
-SPLINES, ONES = mixed_scene(seed=1), torch.ones(4, dtype=torch.float32)
-
-
-def refused(**options: Any) -> Callable[[], object]:
-    return lambda: render(SceneTensors(SPLINES, {}), **options)
-
-
-def values(**changed: Any) -> Callable[[], object]:
-    return lambda: render(SceneTensors(random_scene(FILL), changed))
-
-
-REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
-    "no attribute 'colour'": (ValueError, values(colour=torch.zeros(4))),
-    r"colors has shape \(3,\), not \(4, 3\)": (ValueError, values(colors=torch.zeros(3).float())),
-    "colors is torch.float16": (TypeError, values(colors=torch.zeros(4, 3).half())),
-    "colors is a ndarray": (TypeError, values(colors=np.zeros((4, 3), np.float32))),
-    "colors is on meta": (
-        ValueError,
-        values(opacities=ONES, colors=torch.zeros(4, 3, device="meta").float()),
-    ),
-    "colors: numbers that are not finite": (ValueError, values(colors=torch.zeros(4, 3).float() / 0)),
-    "focus has no gradient": (ValueError, values(focus=torch.zeros(4, 3).float().requires_grad_())),
-    "width must be a whole number": (UsageError, refused(width=0)),
-    "do not have the proportions": (UsageError, refused(width=40, height=72)),
-    "not 'fast'": (UsageError, refused(renderer="fast")),
-    "is a spline": (ValueError, refused(renderer="splat")),
-    "no scene": (UsageError, lambda: render([])),
-    "take about .* GB": (ResourceError, refused(width=400_000, height=360_000)),
-    "threads must be a whole number from 1, not 'a'": (UsageError, refused(threads="a")),
-    "threads must be a whole number from 1, not 0": (UsageError, refused(threads=0)),
-    "tensors are on meta": (UsageError, values(opacities=torch.ones(4, device="meta").float())),
-    "as in module": (TypeError, lambda: render(Module(SPLINES))),
-    "not str": (TypeError, lambda: render("<svg")),
-    "list of them, not int": (TypeError, lambda: render([SPLINES, 3])),  # type: ignore[list-item]
-    "needed, not str: warpsplat.load_svg": (TypeError, lambda: SceneTensors.of("<svg/>")),
-    r"give its scene\(\)": (TypeError, lambda: Module(SceneTensors(SPLINES, {}))),
-    "the layout is a str": (TypeError, lambda: SceneTensors("<svg/>", {})),
-}
-
-
-@pytest.mark.parametrize("message", REFUSED)
-def test_what_is_refused_in_one_line(message: str) -> None:
-    kind, call = REFUSED[message]
-    with pytest.raises(kind, match=message) as raised:
-        call()
-    assert "\n" not in str(raised.value)

@@ -1,4 +1,4 @@
-"""The extension ``batch``: its command, and ``vectorize`` with several images."""
+"""The extension ``batch``: its command, ``vectorize`` with several images, and presets."""
 
 from warpsplat.extensions import Command, Extension
 
@@ -8,6 +8,10 @@ EXTENSION = Extension(
             "Vectorize many images: files, folders, patterns, lists.", "warpsplat.batch.command:command"
         )
     },
-    provides={"vectorize_images": "warpsplat.batch.command:vectorize_images"},
+    provides={
+        "vectorize_images": "warpsplat.batch.command:vectorize_images",
+        "with_preset": "warpsplat.batch.presets:with_preset",
+    },
+    api={"load_preset": "warpsplat.batch.presets"},
     uses=("pages",),
 )

@@ -5,7 +5,7 @@
     defaults:            # of every job; keys: the long flags of `warpsplat vectorize`, and RESEARCH_KEYS
       curves: 512
       output: svg        # folder for the results, or their names; default: beside each image
-    presets:
+    presets:             # beside those of configs/presets
       icons: {subject: drawing, minify: true}
     jobs:
       - images: photos/*.jpg
@@ -32,6 +32,7 @@ import yaml
 from warpsplat.batch.file import BatchFile
 from warpsplat.batch.images import find_images
 from warpsplat.batch.layers import KEYS, MATRIX, GivenValue, Layer, combinations, layer_of
+from warpsplat.batch.presets import preset_layer, preset_names
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
@@ -133,10 +134,11 @@ def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets:
         return {}
     line, node = entries[PRESET]
     name = file.text(line, PRESET, file.value(node))
-    if name not in presets:
-        known = ", ".join(presets) or "none"
+    if name not in presets and name not in preset_names():
+        known = ", ".join((*presets, *preset_names()))
         raise file.error(line, f"{PRESET}: there is no {shown(name)}; known are: {known}")
-    return {**presets[name], PRESET: GivenValue(name, file.error_at(line), file.path.parent)}
+    values = presets[name] if name in presets else preset_layer(name)
+    return {**values, PRESET: GivenValue(name, file.error_at(line), file.path.parent)}
 
 
 def _images(file: BatchFile, line: int, node: yaml.Node) -> list[FoundImage]:

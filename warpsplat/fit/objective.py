@@ -41,6 +41,10 @@ class Quadratic:
     weights: wp.array
     """Of the pixels, 0 outside the image, by tiles, as the film's ``inside``."""
 
+    def pixel_weights(self) -> FloatArray:
+        """Return the weights of the pixels, shape (tile, TILE, TILE)."""
+        return read_tiles(self.weights)
+
     def removal_costs(self) -> FloatArray:
         """Return by how much the loss grows without each shape, shape (shape,)."""
         return self.renderer.removal_costs(self.target, self.weights)

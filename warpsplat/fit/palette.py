@@ -12,7 +12,6 @@ from warpsplat.alpha import straight
 from warpsplat.fit.paints import without_gradients
 from warpsplat.fit.place import reduced
 from warpsplat.fit.settings import Settings, solid_color
-from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import Canvas, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas
 
@@ -113,7 +112,7 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
     step.render()
     seen = step.renderer.visible()
     near = step.objective.quadratic()
-    weighted = read_tiles(near.weights)[seen.tile] * seen.share
+    weighted = near.pixel_weights()[seen.tile] * seen.share
     squares = (weighted * seen.share).sum(axis=(1, 2), dtype=np.float64)
     residual = near.residual()[seen.tile]
     residual *= weighted[:, None]

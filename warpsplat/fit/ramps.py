@@ -18,7 +18,6 @@ import numpy.typing as npt
 
 from warpsplat.kernels import constants
 from warpsplat.portable import elementary, linear
-from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import GRADIENTS, FloatArray
 from warpsplat.scene.geometry import bounds
 
@@ -95,7 +94,7 @@ class RampSolver:
         self._gradient = np.isin(self.scene.paint, GRADIENTS)
         near = step.objective.quadratic()
         self._residual = near.residual()
-        self._importance = read_tiles(near.weights)
+        self._importance = near.pixel_weights()
         boxes = bounds(self.scene).astype(np.float64)
         self._middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
         self._half = np.maximum(0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1), 0.5)

@@ -14,6 +14,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
+from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     Option,
     nearest,
@@ -79,8 +80,8 @@ FORMS = {
 
 POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
 
-FORM_POINT_RATE = 3.0
-"""Learning rate of the values of forms [px]."""
+FORM_POINT_RATE, FORM_SURPLUS = 6.0, 2.0
+"""Learning rate of the values of forms [px], and their ``Density.surplus``."""
 
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
@@ -149,6 +150,7 @@ class Density:
         check_fields(self, "density ")
 
 
+@described
 @dataclass(frozen=True)
 class Settings:
     """Everything but the image that decides the result. Fields without help are set by other options."""
@@ -274,6 +276,10 @@ class Settings:
     )
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
+    )
+    strokes: bool = option(
+        False,
+        "Of drawings: what a round pen draws in even width becomes strokes; drafts have none.",
     )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
@@ -468,6 +474,8 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
         preset = load_renderer(renderer).preset(preset)
     elif given.get("shape", CURVE) != CURVE:
         rates["points"] = FORM_POINT_RATE
+        density = replace(preset.density, surplus=FORM_SURPLUS)
+        preset = replace(preset, texture=0.0, density=density)
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if given.get("opaque"):

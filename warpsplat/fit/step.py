@@ -108,7 +108,7 @@ class Step:
         beside_forms = [backend.program("update")] if state.parameters.forms else []
         if state.parameters.curves:  # the outlines of forms are smooth by themselves
             for loss in losses.SHAPE_LOSSES:
-                loss.record(*beside_forms or [update], inputs)
+                loss.record(beside_forms[0] if beside_forms else update, inputs)
         for program in beside_forms:
             record_gather(program, state.parameters)  # with what the losses added
         record_adam(update, state.parameters, state.clock, self.settings)

@@ -50,3 +50,4 @@ class Options(RefineOptions, total=False):
     page: str | None
     units: str | None
     symbols: bool | None
+    strokes: bool | None

@@ -214,7 +214,7 @@ def _rounded(boxes: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     low = np.where(is_round, middle - radii, np.round(low))
     high = np.where(is_round, middle + radii, np.round(high))
     left = (radii >= (exact > 0)) & (high - low >= np.maximum(1, 2 * radii))
-    return np.concatenate([low, high, radii], axis=1), left.all(axis=1)
+    return np.concatenate([low, high, radii], axis=1), np.asarray(left.all(axis=1))
 
 
 def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, Floats]]:

@@ -11,9 +11,10 @@ from warpsplat.fit.optimizer import units_of
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import Scene
+from warpsplat.scene.scene import check_scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import render
-from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of, check_scene
+from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
 
 
 class Module(torch.nn.Module):

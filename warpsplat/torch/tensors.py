@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from warpsplat.field_docs import described
 from warpsplat.scene import ATTRIBUTES, Attribute, Scene, Unit
+from warpsplat.scene.scene import check_scene
 
 TABLE = {attribute.name: attribute for attribute in ATTRIBUTES}
 
@@ -19,6 +21,7 @@ WITHOUT_GRADIENT = ("focus",)
 """Attributes whose gradient is not computed."""
 
 
+@described
 @dataclass(frozen=True)
 class SceneTensors:
     """Shapes whose attributes are tensors, on one device."""
@@ -104,15 +107,6 @@ class SceneTensors:
         for i in np.flatnonzero(twin).tolist():  # twins whose points have come apart are two shapes
             twin[i] = np.array_equal(scene.points_of(i), scene.points_of(i - 1))
         return replace(scene, twin=twin)
-
-
-def check_scene(scene: object) -> None:
-    """Raise a ``TypeError`` unless ``scene`` is a ``Scene``."""
-    if isinstance(scene, Scene):
-        return
-    found = type(scene).__name__
-    more = {"SceneTensors": ": give its scene()", "str": ": warpsplat.load_svg reads one from a file or text"}
-    raise TypeError(f"a Scene is needed, not {found}{more.get(found, '')}")
 
 
 @functools.cache

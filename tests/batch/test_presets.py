@@ -1,0 +1,68 @@
+"""Presets: those that warpsplat brings, and files of users."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import warpsplat
+from tests.batch.helpers import load_jobs, write
+from tests.cli.helpers import one_line, run
+from warpsplat.batch.presets import FOLDER, load_preset, preset_names, with_preset
+from warpsplat.errors import UsageError
+from warpsplat.fit.settings import make_settings
+from warpsplat.scene import Kind
+
+NAMES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
+
+
+def test_those_that_there_are() -> None:
+    assert preset_names() == NAMES
+    for name in NAMES:
+        make_settings(**load_preset(name))
+        assert (FOLDER / f"{name}.yaml").read_text("utf-8").startswith("# "), "says what it is for"
+
+
+def test_options_beside_a_preset_count_more() -> None:
+    settings = make_settings(**with_preset("brush", {"curves": 12, "kind": None, "quality": None}))
+    assert settings.curves == 12 and settings.kind == Kind.STROKE and settings.spline_points == 5
+    closed = make_settings(**with_preset("brush", {"kind": Kind.FILL}))
+    assert closed.kind == Kind.FILL
+
+
+def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A name, and a file with a setting that only files have."""
+    quick = ("--iterations", "12", "--device", "cpu", "--curves", "6", "-q")
+    assert run("vectorize", image, "-o", tmp_path / "a.svg", "--preset", "low-poly", *quick) == 0
+    assert (tmp_path / "a.svg").read_text("utf-8").count("<polygon") == 6
+    own = tmp_path / "mine.yaml"
+    own.write_text("shape: circle\ncurves: 99\ndensity: {surplus: 1}\n", "utf-8")
+    assert run("vectorize", image, "-o", tmp_path / "b.svg", "--preset", own, *quick) == 0
+    assert (tmp_path / "b.svg").read_text("utf-8").count("<circle") == 6
+    assert run("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick) == 2
+    assert "known are: brush, ink" in one_line(capfd.readouterr().err)
+    own.write_text("shape: circle\ncurve: 99\n", "utf-8")
+    assert run("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick) == 2
+    assert "mine.yaml:2: unknown key 'curve'" in one_line(capfd.readouterr().err)
+
+
+def test_batch_files_know_them(folder: Path) -> None:
+    """A batch file's own presets come first."""
+    jobs = load_jobs(
+        write(
+            folder,
+            "presets: {ink: {curves: 3}}\njobs:\n"
+            "  - {images: in/a.png, preset: ink}\n  - {images: in/b.jpg, preset: low-poly, curves: 7}\n",
+        )
+    )
+    assert [job.settings.curves for job in jobs] == [3, 7]
+    assert [job.settings.shape for job in jobs] == ["curve", "triangle"]
+    with pytest.raises(UsageError, match="there is no 'oil'; known are: ink, brush, ink"):
+        load_jobs(write(folder, "presets: {ink: {curves: 3}}\njobs: [{images: in/a.png, preset: oil}]"))
+
+
+def test_from_python() -> None:
+    assert warpsplat.load_preset("low-poly")["shape"] == "triangle"
+    with pytest.raises(UsageError, match="there is no preset 'oil'"):
+        warpsplat.load_preset("oil")
