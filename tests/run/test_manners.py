@@ -103,7 +103,14 @@ def test_every_element_that_draws_is_counted(shape: str) -> None:
 
 DESCRIBED = (
     *(warpsplat.Result, LevelScore, warpsplat.Score, warpsplat.Progress, warpsplat.Snapshot),
-    *(warpsplat.Expected, warpsplat.Suggestion, warpsplat.Scene, warpsplat.Canvas, Picture),
+    *(
+        warpsplat.Expected,
+        warpsplat.Suggestion,
+        warpsplat.Scene,
+        warpsplat.Canvas,
+        Picture,
+        warpsplat.CustomLoss,
+    ),
 )
 
 
