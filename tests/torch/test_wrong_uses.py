@@ -87,21 +87,21 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (UsageError, "threads must be a whole number from 1, not -1", drawn(threads=-1)),
     # Things that are no scenes
     (UsageError, "no scene to render", lambda: render([])),
-    (TypeError, r"as in module\(\); render takes its tensors\(\)", lambda: render(Module(SPLINES))),  # type: ignore[arg-type]
-    (TypeError, "takes SceneTensors or a Scene, or a list of them, not str", lambda: render("<svg")),  # type: ignore[arg-type]
+    (TypeError, r"as in module\(\); render takes its tensors\(\)", lambda: render(Module(SPLINES))),
+    (TypeError, "takes SceneTensors or a Scene, or a list of them, not str", lambda: render("<svg")),
     (TypeError, "or a list of them, not int", lambda: render([SPLINES, 3])),  # type: ignore[list-item]
-    (TypeError, "not str: warpsplat.load_svg reads one", lambda: SceneTensors.of("<svg/>")),  # type: ignore[arg-type]
-    (TypeError, "the layout is a str, not a Scene", lambda: SceneTensors("<svg/>", {})),  # type: ignore[arg-type]
-    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: Module(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
-    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: warpsplat.save_svg(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
-    (TypeError, "a Scene is needed, not Result", lambda: warpsplat.save_svg(warpsplat.vectorize(PIXELS))),  # type: ignore[arg-type]
-    (TypeError, "is its text, a path, bytes or a file, not NoneType", lambda: warpsplat.render(None)),  # type: ignore[arg-type]
+    (TypeError, "not str: warpsplat.load_svg reads one", lambda: SceneTensors.of("<svg/>")),
+    (TypeError, "the layout is a str, not a Scene", lambda: SceneTensors("<svg/>", {})),
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: Module(SceneTensors(SCENE, {}))),
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: warpsplat.save_svg(SceneTensors(SCENE, {}))),
+    (TypeError, "a Scene is needed, not Result", lambda: warpsplat.save_svg(warpsplat.vectorize(PIXELS))),
+    (TypeError, "is its text, a path, bytes or a file, not NoneType", lambda: warpsplat.render(None)),
     (ImageError, "the SVG: is empty: give an SVG's text", lambda: warpsplat.load_svg("")),
     (
         TypeError,
         "an image is a path, .* or an array, not Tensor",
         lambda: warpsplat.vectorize(torch.zeros(36, 40, 3)),
-    ),  # type: ignore[arg-type]
+    ),
 ]
 """Error, pattern of its message, use."""
 
