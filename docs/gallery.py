@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "gallery"
 SUBJECTS = tuple(name for name in get_args(Subject) if name != "auto")
 
-DECIDING = ("drawing", "fit", "kernels", "portable", "rendering", "run", "scene", "search", "svg")
+DECIDING = ("drawing", "fit", "forms", "kernels", "portable", "rendering", "run", "scene", "search", "svg")
 """Parts of the package whose code decides what a file becomes."""
 
 MOST_POINTS = 24

@@ -5,6 +5,8 @@ values from ``first`` on, and ``adjoint(values, first, count, j, points_grad, st
 value ``j``, by those of the ``drawn`` control points from ``start`` on. Their kernels are made from them.
 """
 
+from typing import Any
+
 import warp as wp
 
 from warpsplat.kernels import constants
@@ -12,7 +14,7 @@ from warpsplat.kernels import constants
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 
-def make_place(name: str, point: wp.Function) -> wp.Kernel:
+def make_place(name: str, point: Any) -> wp.Kernel:
     """Return the kernel that computes the control points of a form's shapes."""
 
     @wp.kernel(name=f"place_{name}", module="unique", module_options=constants.MODULE_OPTIONS)
@@ -38,7 +40,7 @@ def make_place(name: str, point: wp.Function) -> wp.Kernel:
     return place
 
 
-def make_gather(name: str, adjoint: wp.Function) -> wp.Kernel:
+def make_gather(name: str, adjoint: Any) -> wp.Kernel:
     """Return the kernel of the adjoint."""
 
     @wp.kernel(name=f"gather_{name}", module="unique", module_options=constants.MODULE_OPTIONS)

@@ -40,7 +40,8 @@ def numbers(values: Array) -> Array:
 
 def values(numbers: Array) -> Array:
     """Return centre and axes."""
-    return frame.frames_of(numbers[:, :2], *numbers[:, 2:].T)
+    first, second, degrees = numbers[:, 2:].T
+    return frame.frames_of(numbers[:, :2], first, second, degrees)
 
 
 def element(numbers: list[float], closed: bool) -> str:

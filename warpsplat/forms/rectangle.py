@@ -45,7 +45,7 @@ def numbers(values: Array) -> Array:
 def values(numbers: Array) -> Array:
     """Return centre and axes."""
     corners, sizes, degrees = numbers[:, :2], numbers[:, 2:4], numbers[:, 4]
-    return frame.frames_of(corners + sizes / 2, *(sizes.T / 2), degrees)
+    return frame.frames_of(corners + sizes / 2, sizes[:, 0] / 2, sizes[:, 1] / 2, degrees)
 
 
 def element(numbers: list[float], closed: bool) -> str:

@@ -28,7 +28,7 @@ def held_values(scene: Scene, exact: Points) -> Iterator[tuple[IndexArray, Point
 
 def form_elements(scene: Scene, per_pixel: float) -> dict[int, str]:
     """Return the elements, without style, of the shapes that are forms."""
-    found = {}
+    found: dict[int, str] = {}
     for group in scene.alike():
         if group.basis.is_form:
             form = form_of(group.basis.name)
