@@ -75,9 +75,9 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (UsageError, "width must be a whole number from 1 to .*, not 64.5", drawn(width=64.5)),
     (UsageError, "40x72 px do not have the proportions of 40x36", drawn(width=40, height=72)),
     (UsageError, "scenes of several sizes or devices", lambda: render([SCENE, LARGE])),
-    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: render(LARGE, 30_000)),
-    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: warpsplat.render(LARGE, 30_000)),
-    (ResourceError, "would take about .* GB, memory for it is", lambda: render([LARGE] * 100, 20_000)),
+    (ResourceError, "300000x270000 px would take about 3888.0 GB", lambda: render(LARGE, 300_000)),
+    (ResourceError, "300000x270000 px would take about 3888.0 GB", lambda: warpsplat.render(LARGE, 300_000)),
+    (ResourceError, "would take about .* GB, memory for it is", lambda: render([LARGE] * 100, 100_000)),
     (ValueError, "a canvas of 0x64 px has no pixel", lambda: Canvas(0, 64, None)),
     # Options
     (UsageError, "renderer must be one of exact.*, not 'fast'", drawn(renderer="fast")),
