@@ -11,7 +11,6 @@ from warpsplat.fit.settings import Painting, Quality, Subject
 class RefineOptions(TypedDict, total=False):
     """Options that ``refine`` shares with ``vectorize``. One that is None counts as not given."""
 
-    loss: LossName | None
     time_budget: float | str | None
     background: str | None
     title: str | None
@@ -49,4 +48,3 @@ class Options(RefineOptions, total=False):
     page: str | None
     units: str | None
     symbols: bool | None
-    strokes: bool | None
