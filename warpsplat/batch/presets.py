@@ -41,7 +41,7 @@ def preset_layer(preset: str) -> Layer:
 
 
 def load_preset(preset: str) -> dict[str, Any]:
-    """Return the settings of a preset as keywords of ``vectorize``; see ``preset_layer``."""
+    """Return the settings of a preset as keywords of ``make_settings``; see ``preset_layer``."""
     values = {key.replace("-", "_"): item.value for key, item in preset_layer(preset).items()}
     for name, kind in KINDS.items():
         if values.pop(name, False):

@@ -174,7 +174,8 @@ class Settings:
     )
     shape: str = option(
         CURVE,
-        "Form of shapes: curve, triangle, rectangle, ellipse, circle, polygon:N, or line, a straight stroke.",
+        "Form of all shapes: triangle, rectangle, ellipse, circle, polygon:N, or line, a straight stroke.",
+        shown_default="free outlines",
         pattern=f"{CURVE}|{'|'.join(FORMS)}|polygon:({POLYGON_CORNERS})",
         wanted=f"one of {', '.join((CURVE, *FORMS))}, or polygon:N with 3 to 64 corners",
         metavar="FORM",
