@@ -23,7 +23,7 @@ class Concatenate(torch.autograd.Function):
     def forward(ctx: Any, *tensors: Tensor) -> Tensor:
         """Return the numbers, shape (number,)."""
         ctx.shapes = [tensor.shape for tensor in tensors]
-        constants = torch.tensor([0.0, 1.0], device=tensors[0].device)
+        constants = torch.tensor([0.0, 1.0], dtype=torch.float32, device=tensors[0].device)
         # Making a view takes microseconds; tensors of one dimension need none.
         return torch.cat([constants, *(each if each.dim() == 1 else each.reshape(-1) for each in tensors)])
 
