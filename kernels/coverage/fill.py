@@ -35,6 +35,7 @@ MARGIN = wp.constant(constants.TILE_MARGIN)
 BESIDE = wp.constant(1.0e-3)  # [px] distance from an edge at which winding numbers are those beside it
 BORDER_TOLERANCE = wp.constant(1.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
 ROUNDING = wp.constant(2.4e-7)  # of coordinates
+NOT_ALONG = wp.constant(0.02)  # [px] an edge that goes so far across lies on no border: most end the test here
 
 
 @wp.func
@@ -73,6 +74,8 @@ def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
 @wp.func
 def on_border(a: wp.float32, b: wp.float32) -> wp.bool:
     """Return whether an edge between two coordinates ``a`` and ``b`` lies on one border of pixels."""
+    if wp.abs(b - a) > NOT_ALONG:
+        return False
     border = wp.floor(a + 0.5)
     tolerance = BORDER_TOLERANCE + ROUNDING * wp.abs(border)
     return wp.max(wp.abs(a - border), wp.abs(b - border)) <= tolerance

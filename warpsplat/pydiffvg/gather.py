@@ -30,7 +30,7 @@ class Concatenate(torch.autograd.Function):
     def forward(ctx: Any, places: Sequence[Place], *tensors: Tensor) -> Tensor:
         """Return the numbers, shape (number,); ``places``: of the tensors among them."""
         ctx.places = places
-        constants = torch.tensor([0.0, 1.0], device=tensors[0].device)
+        constants = torch.tensor([0.0, 1.0], dtype=torch.float32, device=tensors[0].device)
         return _flatten_dense_tensors((constants, *tensors))
 
     @staticmethod

@@ -51,8 +51,8 @@ class PixelFilter:
     def _weights(self, count: int, parts: int, device: torch.device) -> Tensor:
         """Return the weights of parts along one axis for each of ``count`` pixels, shape (pixel, part)."""
         radius = self.radius.to(device, torch.float32).reshape(())
-        borders = torch.arange(count * parts + 1, device=device) / parts
-        centres = torch.arange(count, device=device) + 0.5
+        borders = torch.arange(count * parts + 1, dtype=torch.float32, device=device) / parts
+        centres = torch.arange(count, dtype=torch.float32, device=device) + 0.5
         u = ((borders - centres[:, None]) / radius).clamp(-1, 1)
         weights = self._integral(u).diff(dim=1)
         return weights / weights.sum(dim=1, keepdim=True)

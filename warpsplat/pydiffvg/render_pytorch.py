@@ -165,7 +165,7 @@ def _render_distances(scene: SceneArguments, width: int, height: int, positions:
     threads = torch.get_num_threads()
     if positions is None:
         return distances(scene, _centres(scene, width, height), threads).view(height, width, 1)
-    unit = torch.tensor([scene.width / width, scene.height / height], device=get_device())
+    unit = torch.tensor([scene.width / width, scene.height / height]).to(get_device(), torch.float32)
     return distances(scene, positions.to(get_device(), torch.float32) * unit, threads)[:, None]
 
 
