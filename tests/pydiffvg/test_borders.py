@@ -76,3 +76,9 @@ def test_a_rectangle_grows_to_a_target_from_whole_numbers() -> None:
 
 def group_of() -> pydiffvg.ShapeGroup:
     return pydiffvg.ShapeGroup(torch.tensor([0]), tensor(0.3, 0.6, 0.2, 1.0))
+
+
+def test_edges_shorter_than_rounding_have_finite_gradients() -> None:
+    points = tensor([[8, 8], [8.000002, 8], [30, 8], [30, 30], [8, 30]]).requires_grad_()
+    weighted(render([pydiffvg.Polygon(points, True)], [group_of()])).backward()
+    assert points.grad is not None and points.grad.isfinite().all()
