@@ -534,8 +534,6 @@ def sums_along_border(
     border = int(wp.floor(wp.where(upright, start[0] - corner[0], start[1] - corner[1]) + 0.5))
     a = wp.where(upright, start[1] - corner[1], start[0] - corner[0])
     length = wp.where(upright, d[1], d[0])
-    if length == 0.0:  # as near to a border by the other coordinate
-        return wp.vec2(0.0, 0.0)
     # The pixels on the side where the edge, moved there, adds to the area come first.
     before = border
     if upright == (length > 0.0):
