@@ -12,6 +12,7 @@ from typing import Any
 import click
 import gallery_pages
 import gallery_reports
+import notebooks
 import option_tables
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -44,6 +45,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         [COMMANDS_INTRODUCTION, *(line for name in COMMANDS for line in command_help(name))]
     )
     files.append(File.generated(config, "commands.md", content=reference))
+    for path in notebooks.paths():
+        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebooks.page(path)))
     for page, text in {**gallery_pages.pages(), **gallery_reports.reports()}.items():
         files.append(File.generated(config, page, content=text))
     return files

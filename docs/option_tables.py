@@ -20,7 +20,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypedDict
 
-from warpsplat.fit.settings import Painting, Quality, Subject
+from warpsplat.fit.custom_loss import CustomLoss, LossFunction
+from warpsplat.fit.settings import LossName, Painting, Quality, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -48,6 +49,8 @@ def typed_options() -> str:
 
 def annotation(option: Option) -> str:
     """Return the type of an option's values as users write them."""
+    if option.name == "loss":  # or a function
+        return "LossName | LossFunction | CustomLoss"
     written = {**Settings.__annotations__, **make_settings.__annotations__}.get(option.keyword, "bool")
     written = written.removesuffix(" | None").replace("tuple[", "Sequence[").replace(", ...]", "]")
     return f"{written} | str" if option.parse else written

@@ -77,6 +77,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
             blue = column(0.0)
             if straight:
                 touched = column(0.0)
+                seen = column(0.0)
             for k in range(start, stop):
                 paint = list_paint[k]
                 slot = list_slot[k]
@@ -108,10 +109,12 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
                     green = green + paint_times(paint, 1, share)
                     blue = blue + paint_times(paint, 2, share)
                 transmittance = transmittance - share
+                if straight:
+                    seen = seen + share
             if straight:
                 one = column(1.0)
                 touched = wp.min(touched, one)
-                factor = wp.cw_div(touched, wp.max(one - transmittance, constants.NOTHING * one))
+                factor = wp.cw_div(touched, wp.max(seen, constants.NOTHING * one))
                 image[tile, 0, x] = wp.cw_mul(red, factor)
                 image[tile, 1, x] = wp.cw_mul(green, factor)
                 image[tile, 2, x] = wp.cw_mul(blue, factor)

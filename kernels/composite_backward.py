@@ -12,11 +12,12 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint.flat import paint_against
-from warpsplat.kernels.tile import total
+from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
+STEEPER = wp.constant(1.0e30)  # the same for coverages, which may be so small that they are not seen
 TINY = wp.constant(1.0e-9)
 
 
@@ -27,7 +28,7 @@ def slope_of(mapping: wp.int32, signed: Any):
     slope = one - wp.abs(signed)
     if mapping == constants.AREA:
         slope = wp.min(STEEP * slope, one)
-        slope = wp.cw_mul(slope, wp.min(wp.max(STEEP * signed, -one), one))
+        slope = wp.cw_mul(slope, wp.min(wp.max(STEEPER * signed, -one), one))
     return slope
 
 
@@ -39,6 +40,7 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
         column: type of its vectors of pixels.
         painted: whether there may be gradients and pictures, or a transparent canvas.
     """
+    single_lane = column is tile_column
     name = "paint_backward" if painted else "composite_backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
@@ -135,11 +137,7 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
                         paint_columns[slot, 1, x] = green_grad
                         paint_columns[slot, 2, x] = blue_grad
                         paint_columns[slot, 3, x] = opacity * wp.cw_mul(covered, alpha_grad)
-                if lane_columns == 1:
-                    slot_grad[slot, lane] = wp.vec4(
-                        total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
-                    )
-                else:
+                if single_lane:
                     if x > 0:
                         red_grad = red_grad + slot_columns[slot, 0]
                         green_grad = green_grad + slot_columns[slot, 1]
@@ -149,5 +147,10 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
                     slot_columns[slot, 1] = green_grad
                     slot_columns[slot, 2] = blue_grad
                     slot_columns[slot, 3] = opacity_grad
+                else:
+                    grad = wp.vec4(total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad))
+                    if x > lane * lane_columns:
+                        grad = grad + slot_grad[slot, lane]
+                    slot_grad[slot, lane] = grad
 
     return backward

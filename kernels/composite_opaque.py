@@ -16,7 +16,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.composite_backward import slope_of
 from warpsplat.kernels.paint.flat import paint_against
-from warpsplat.kernels.tile import total
+from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -31,9 +31,10 @@ def premultiplied_grads(
     image_grad: wp.array3d[Any],
     tile: wp.int32,
     x: wp.int32,
+    opaque: Any,
 ):
     """Return the factor from gradients of straight colours to those of premultiplied ones, and the gradients
-    of the opacity and of hit, in a column of pixels.
+    of the opacity and of hit, in a column of pixels whose opacities are ``opaque``.
 
     Opacities that are no longer divided by, and pixels that are hit throughout, have none.
     """
@@ -42,12 +43,11 @@ def premultiplied_grads(
     along = along + wp.cw_mul(image[tile, 1, x], image_grad[tile, 1, x])
     along = along + wp.cw_mul(image[tile, 2, x], image_grad[tile, 2, x])
     touched = hit[tile, x]
-    opaque = image[tile, 3, x]
     divisor = wp.max(opaque, constants.NOTHING * one)
-    above = wp.min(wp.max(STEEP * (opaque - constants.NOTHING * one), 0.0 * one), one)
+    above = wp.min(opaque / constants.NOTHING, one)
     opacity_grad = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
     partly = wp.min(STEEP * (one - touched), one)
-    hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, TINY * one)), partly)
+    hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, constants.NOTHING * one)), partly)
     return wp.cw_div(touched, divisor), opacity_grad, hit_grad
 
 
@@ -62,6 +62,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
             is added to that of each coverage.
     """
     painted = painted or straight
+    single_lane = column is tile_column
     name = "straight_backward" if straight else "opaque_paint_backward" if painted else "opaque_backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
@@ -98,10 +99,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
             green = image_grad[tile, 1, x]
             blue = image_grad[tile, 2, x]
             if straight:
-                factor, opaque, hit_grad = premultiplied_grads(image, hit, image_grad, tile, x)
-                red = wp.cw_mul(red, factor)
-                green = wp.cw_mul(green, factor)
-                blue = wp.cw_mul(blue, factor)
+                opaque = zero
                 behind = zero
             else:
                 opaque = zero
@@ -121,6 +119,13 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                     if opacity < 0.0:
                         seen = wp.cw_mul(seen, paint_columns[wp.max(slot, -1 - slot), 3, x])
                 transmittance = transmittance - seen
+                if straight:
+                    opaque = opaque + seen
+            if straight:
+                factor, opaque, hit_grad = premultiplied_grads(image, hit, image_grad, tile, x, opaque)
+                red = wp.cw_mul(red, factor)
+                green = wp.cw_mul(green, factor)
+                blue = wp.cw_mul(blue, factor)
             for n in range(start, stop):
                 k = start + stop - 1 - n
                 paint = list_paint[k]
@@ -175,11 +180,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                         paint_columns[slot, 1, x] = green_grad
                         paint_columns[slot, 2, x] = blue_grad
                         paint_columns[slot, 3, x] = opacity * wp.cw_mul(covered, alpha_grad)
-                if lane_columns == 1:
-                    slot_grad[slot, lane] = wp.vec4(
-                        total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad)
-                    )
-                else:
+                if single_lane:
                     if x > 0:
                         red_grad = red_grad + slot_columns[slot, 0]
                         green_grad = green_grad + slot_columns[slot, 1]
@@ -189,5 +190,10 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                     slot_columns[slot, 1] = green_grad
                     slot_columns[slot, 2] = blue_grad
                     slot_columns[slot, 3] = opacity_grad
+                else:
+                    grad = wp.vec4(total(red_grad), total(green_grad), total(blue_grad), total(opacity_grad))
+                    if x > lane * lane_columns:
+                        grad = grad + slot_grad[slot, lane]
+                    slot_grad[slot, lane] = grad
 
     return backward

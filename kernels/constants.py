@@ -1,5 +1,7 @@
 """Numbers that host code, kernels and the reference renderer share, with the reason for each."""
 
+import platform
+
 FILL = 0
 STROKE = 1
 """Kinds of shapes: a closed ring of cubics that is painted inside, a chain of cubics painted along."""
@@ -66,7 +68,7 @@ TRANSMITTANCE_MIN = 1.0e-4
 SEEN = 0.5 / 255.0
 """Opacity from which on a shape hides the black that pictures that are not premultiplied begin with."""
 
-NOTHING = 1.0e-4
+NOTHING = 1.0e-28
 """Opacity of a pixel below which its colour is no longer divided by it."""
 
 EPSILON = 1.0e-6
@@ -106,15 +108,29 @@ PARTIAL = COVERED + UNCOVERED
 HIDDEN = 4
 """Added to the state of a slot that is hidden by opaque slots in front."""
 
+ALIGNED = 8
+"""Added to PARTIAL where an edge of the shape lies on a border of pixels."""
+
+TILE_MARGIN = 0.01
+"""Distance [px] from a tile at which an edge of a fill counts as touching it."""
+
+NEARLY_NONE = 1.0e-20
+NEARLY_ALL = 1.0 - 2.0**-24
+"""Coverages that show as 0 and 1 but have a gradient, where an edge on a border of pixels may change them."""
+
 AREA = 0
 PRODUCT = 1
 """Coverage mappings from the sum s that a model computes: |s|, clamped at 1, or 1 - exp(-s)."""
+
+STACK_FLAGS = " -mstackrealign -mstack-alignment=32" * (platform.machine().lower() in {"x86_64", "amd64"})
+"""Vectors that do not fit into registers lie at multiples of 32 bytes on the stack. Otherwise half of all
+processes, by where their stack happens to begin, take twice as long for compositing."""
 
 MODULE_OPTIONS = {
     "enable_backward": False,
     "optimization_level": 3,
     "cpu_compiler_flags": "-march=native -ffp-contract=off"
-    " -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4",
+    " -mllvm=-inline-threshold=9000 -mllvm=-unroll-full-max-count=4" + STACK_FLAGS,
 }
 """Options of every kernel module. A CPU contracts no products and sums, or results would depend on whether
 it has fused multiply-adds. Loops over the 16 elements of a column become vector instructions only where

@@ -151,7 +151,7 @@ def outline_forward(
     count = pieces
     if is_last and not closed:
         count += 1
-    reach = float(0.0)
+    reach = float(constants.TILE_MARGIN)
     if kind[shape] != constants.FILL:
         reach = wp.min(0.5 * scale * widths[shape], constants.REACH_MAX) + 1.0
     for k in range(count):

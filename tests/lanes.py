@@ -10,11 +10,11 @@ import pytest
 from warpsplat.rendering.backend import GPU_LANES, Backend
 
 
-def divide_as_on_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make backends from now on have a GPU's lanes."""
+def divide_as_on_gpu(monkeypatch: pytest.MonkeyPatch, lanes: int = GPU_LANES) -> None:
+    """Make backends from now on have a GPU's lanes, or fewer."""
     usual = Backend.on
 
     def on(*arguments: Any, **named: Any) -> Backend:
-        return replace(usual(*arguments, **named), lanes=GPU_LANES)
+        return replace(usual(*arguments, **named), lanes=lanes)
 
     monkeypatch.setattr(Backend, "on", staticmethod(on))

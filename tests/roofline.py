@@ -20,6 +20,7 @@ from tests.runs import vectorize
 from tests.tracing.copies import Copies, Ledger, counting
 from tests.tracing.trace import Count, Memory, Tracer, tracing
 from warpsplat.fit import densification, loop
+from warpsplat.fit.objective import Quadratic
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
 from warpsplat.fit.state import FitState
@@ -53,7 +54,8 @@ KINDS = ("closed", "open")
 WATCHED = (
     *((loop, name) for name in ("densify", "recover", "evaluate_file", "choose_grid", "freeze_stage")),
     *((densification, name) for name in ("new_shapes", "duplicates", "_reduce_points", "replace_shapes")),
-    *((Step, name) for name in ("rebuilt", "removal_costs")),
+    (Step, "rebuilt"),
+    (Quadratic, "removal_costs"),
 )
 """Functions whose time on the host is measured."""
 

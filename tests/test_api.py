@@ -223,19 +223,19 @@ def test_threads_do_not_disturb_each_other(device: str) -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("ThreadPool")]
 
 
+EXTENSIONS_OF = {"report": "pages", "Recorder": "motion", "Live": "motion", "load_preset": "batch"}
+"""Public names of extensions."""
+
+
 def test_what_is_public_is_there_and_light() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
-        *("starting_scene", "load_image", "vectorize_several", "suggest"),
+        *("starting_scene", "load_image", "vectorize_several", "suggest", "CustomLoss"),
         *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
-        *("Suggestion", "Expected"),
+        *("Suggestion", "Expected", "CustomLoss"),
         *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
-    public |= {
-        name
-        for name, home in {"report": "pages", "Recorder": "motion", "load_preset": "batch"}.items()
-        if home in extensions()
-    }
+    public |= {name for name, home in EXTENSIONS_OF.items() if home in extensions()}
     assert set(warpsplat.__all__) == public == set(dir(warpsplat))
     for name in public:
         assert getattr(warpsplat, name) is not None

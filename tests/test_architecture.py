@@ -22,6 +22,7 @@ CORE = ("errors", "native", "portable", "scene", "forms", "kernels")
 
 ALLOWED: dict[str, tuple[str, ...]] = {
     "extensions": ("errors",),
+    "field_docs": (),
     "errors": (),
     "native": (),
     "alpha": (),
@@ -46,7 +47,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 ANYTHING = {"", "__main__", "_version", "cli", "configs"}
 """Modules of the core that may import all of it."""
 
-ANYWHERE = {"", "_version", "extensions"}
+ANYWHERE = {"", "_version", "extensions", "field_docs"}
 """Modules that all others may import."""
 
 EXTENSIONS = extensions.folders()

@@ -10,6 +10,7 @@ import re
 import runpy
 import shlex
 import shutil
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 from tests.needs import WHOLE
+from tests.networks import stand_ins
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
 from warpsplat.run.options import OPTIONS
@@ -64,12 +66,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("page", with_code("python"))
-def test_python_runs(page: Path, folder: Path) -> None:
-    """Run the blocks of a page in order."""
+def test_python_runs(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the blocks of a page in order. Networks of others are small ones."""
     names: dict[str, object] = {"__name__": "__main__"}
     for number, block in enumerate(blocks(page, "python")):
-        if "warpsplat.torch" in block:
-            pytest.importorskip("torch")
+        if "import torch" in block or "warpsplat.torch" in block:
+            pytest.importorskip("torch").set_num_threads(1)  # several would wait for each other
+            for name, module in stand_ins().items():
+                monkeypatch.setitem(sys.modules, name, module)
         exec(compile(block, f"{page.name}, block {number}", "exec"), names)
 
 
@@ -117,7 +121,14 @@ def test_files_of_links_are_there(page: Path) -> None:
             assert made or (page.parent / link).exists(), link
 
 
-MADE = {"architecture.md", "changelog.md", "contributing.md", "commands.md", "gallery/index.md"}
+MADE = {
+    *(f"notebooks/{path.stem}.md" for path in ROOT.glob("examples/*.ipynb")),
+    "architecture.md",
+    "changelog.md",
+    "contributing.md",
+    "commands.md",
+    "gallery/index.md",
+}
 """Pages that the site makes."""
 
 
@@ -145,7 +156,9 @@ def test_one_word_for_one_thing() -> None:
         text = (ROOT / page).read_text("utf-8")
         texts.append(re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL))
     for text in texts:
-        plain = re.sub(r"^ *curves: .*$|\{curves\}", "", text, flags=re.MULTILINE)  # settings and arguments
+        plain = re.sub(
+            r"^ *curves: .*$|\{curves\}|curve, triangle|default: curve\]", "", text, flags=re.MULTILINE
+        )  # settings, arguments and values
         assert not [plain[max(0, m.start() - 30) : m.end() + 10] for m in OTHERWISE.finditer(plain)]
 
 

@@ -1,5 +1,15 @@
 """warpsplat: raster image in, SVG of Bézier shapes out, by gradient descent.
 
+The calls that matter::
+
+    result = warpsplat.vectorize("photo.jpg", 256)            # an image to an SVG: result.save("photo.svg")
+    result = warpsplat.refine("drawing.svg", "photo.jpg")     # an SVG made more like an image
+    scene = warpsplat.load_svg("drawing.svg")                 # its shapes as arrays; save_svg writes them
+    image = warpsplat.render(scene, 800)                      # a scene or an SVG as pixels, 800 px wide
+    print(warpsplat.score("photo.svg", "photo.jpg").psnr)     # how well an SVG shows an image
+
+``help(warpsplat.vectorize)`` and so on say more; gradients for PyTorch are in ``warpsplat.torch``.
+
 What this module offers is the public interface, together with ``warpsplat.errors``, ``warpsplat.scene``,
 ``warpsplat.torch`` and ``warpsplat.pydiffvg``; it keeps to semantic versioning. All else may change.
 """
@@ -19,11 +29,13 @@ if TYPE_CHECKING:
     from warpsplat.errors import ResourceError as ResourceError
     from warpsplat.errors import UsageError as UsageError
     from warpsplat.errors import WarpsplatError as WarpsplatError
+    from warpsplat.fit.custom_loss import CustomLoss as CustomLoss
     from warpsplat.fit.progress import Progress as Progress
     from warpsplat.fit.progress import Snapshot as Snapshot
     from warpsplat.fit.settings import Settings as Settings
     from warpsplat.fit.settings import make_settings as make_settings
     from warpsplat.metrics import Score as Score
+    from warpsplat.motion.notebook import Live as Live
     from warpsplat.motion.recorder import Recorder as Recorder
     from warpsplat.pages.report import report as report
     from warpsplat.run.prepare import load_image as load_image
@@ -57,6 +69,7 @@ _HOMES = {
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),
     **dict.fromkeys(("Progress", "Snapshot"), "warpsplat.fit.progress"),
+    "CustomLoss": "warpsplat.fit.custom_loss",
     "to_pillow": "warpsplat.run.render",
     "Result": "warpsplat.run.result",
     "Score": "warpsplat.metrics",

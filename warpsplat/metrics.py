@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.field_docs import described
 from warpsplat.portable import elementary
 from warpsplat.ssimulacra2 import ssimulacra2
 from warpsplat.svg.inspect import inspect_svg
@@ -157,22 +158,29 @@ def _similarity_sums(a: Floats, b: Floats) -> tuple[float, float]:
     return float((luminance * contrast).sum(dtype=np.float64)), float(contrast.sum(dtype=np.float64))
 
 
+@described
 @dataclass(frozen=True)
 class Score:
     """Figures of a file compared with its image."""
 
     psnr: float
-    """[dB]"""
+    """Peak signal-to-noise ratio [dB]."""
     ssim: float | None
+    """Structural similarity, at most 1; None: the image is too small."""
     ms_ssim: float | None
+    """The same on several scales; None: the image is too small."""
     ssimulacra2: float | None
-    """None: it was not measured, or the image is too small."""
+    """SSIMULACRA2, 100 for equal images; None: it was not measured, or the image is too small."""
     paths: int
-    """As ``SvgFacts.paths``."""
+    """Elements that draw: paths, rectangles, circles, ellipses, lines, polylines and polygons. Not counted
+    are clips, masks, and a background: a rectangle that fills the view box behind the others.
+    """
     nodes: int
-    """As ``SvgFacts.nodes``."""
+    """Points that the paths pass through; other elements count as one."""
     bytes: int
+    """Size of the file."""
     gzip_bytes: int
+    """Its size, compressed."""
 
     def of_file(self, text: str) -> Score:
         """Return the figures for another file, ``text``, of the same picture."""

@@ -8,6 +8,11 @@ area.
 
 Adjoint: a piece with extent (dx, dy), moved by v, changes its pixel's area by dx v_y - dy v_x and no other
 pixel's. An edge's ends take (1 - s) and s of it, s the edge's parameter at the middle of the piece.
+
+An edge on a border of pixels changes the pixel that it moves into; its derivative is the mean of those to
+either side. The sums there are whole numbers, where the derivative of a coverage jumps. So slots with such an
+edge (ALIGNED) store coverages that are never quite 0 or 1, and the adjoint takes the slope from the winding
+numbers beside each edge.
 """
 
 import functools
@@ -26,7 +31,10 @@ TILE_BITS = wp.constant(constants.TILE.bit_length() - 1)  # of a pixel within it
 FLAT = wp.constant(1.0e-30)  # [px] an edge that rises less is horizontal: its slope would not be finite
 MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices seldom lie
 NEVER = wp.constant(4.0)  # beyond the parameters of an edge, which are 0 to 1
-MARGIN = wp.constant(0.01)  # [px] an edge that ends so near to a tile counts as touching it
+MARGIN = wp.constant(constants.TILE_MARGIN)
+BESIDE = wp.constant(1.0e-3)  # [px] distance from an edge at which winding numbers are those beside it
+BORDER_TOLERANCE = wp.constant(1.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
+ROUNDING = wp.constant(2.4e-7)  # of coordinates
 
 
 @wp.func
@@ -62,6 +70,14 @@ def crossing(a: wp.vec2, b: wp.vec2, y: wp.float32) -> wp.int32:
     return 0
 
 
+@wp.func
+def on_border(a: wp.float32, b: wp.float32) -> wp.bool:
+    """Return whether an edge between two coordinates ``a`` and ``b`` lies on one border of pixels."""
+    border = wp.floor(a + 0.5)
+    tolerance = BORDER_TOLERANCE + ROUNDING * wp.abs(border)
+    return wp.max(wp.abs(a - border), wp.abs(b - border)) <= tolerance
+
+
 @wp.kernel
 def fill_states(
     # In:
@@ -77,7 +93,7 @@ def fill_states(
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
-    slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL or FULL
+    slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL, PARTIAL + ALIGNED or FULL
     slot_winding: wp.array[wp.int32],  # [slot_capacity] of slots that no edge touches
 ):
     """Find the states of slots. One thread a row of tiles of a shape (that of its leftmost slot).
@@ -104,7 +120,12 @@ def fill_states(
     for j in range(vertex_first[shape], vertex_last[shape]):
         a = vertex[j]
         b = vertex[vertex_next[j]]
-        if wp.min(a[1], b[1]) <= high and wp.max(a[1], b[1]) >= low:
+        lowest = wp.min(a[1], b[1])
+        highest = wp.max(a[1], b[1])
+        level = bool(False)
+        if lowest <= high + MARGIN and highest >= low - MARGIN:
+            level = on_border(a[1], b[1])
+        if level or (lowest <= high and highest >= low):
             turn = crossing(a, b, low + MIDDLE)
             if turn != 0:
                 slope = (b[0] - a[0]) / (b[1] - a[1])
@@ -113,15 +134,20 @@ def fill_states(
                     winding += turn
                 elif s < end:
                     slot_winding[s] = slot_winding[s] + turn
-            ends = cut_to_row(a, b, low, high)
+            ends = wp.vec2(a[0], b[0])
+            if not level:
+                ends = cut_to_row(a, b, low, high)
+            state = int(constants.PARTIAL)
+            if level or on_border(a[0], b[0]):
+                state = constants.PARTIAL + constants.ALIGNED
             s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
             s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)
             for s in range(s0, s1 + 1):
-                slot_state[s] = constants.PARTIAL
+                slot_state[s] = slot_state[s] | state
     for s in range(slot, end):
         winding += slot_winding[s]
         slot_winding[s] = winding
-        if slot_state[s] != constants.PARTIAL:
+        if slot_state[s] == 0:
             slot_state[s] = constants.UNCOVERED
             if winding % 2 != 0 or (winding != 0 and rule[shape] == constants.NONZERO):
                 slot_state[s] = constants.FULL
@@ -218,10 +244,16 @@ def add_edge(
 
 
 @wp.func
+def is_partial(state: wp.int32) -> wp.bool:
+    """Return whether a slot is PARTIAL and not HIDDEN."""
+    return state & (constants.PARTIAL + constants.HIDDEN) == constants.PARTIAL
+
+
+@wp.func
 def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32) -> wp.bool:
     """Return whether one of the slots [first, last) is PARTIAL and not HIDDEN."""
     for s in range(first, last):
-        if slot_state[s] == constants.PARTIAL:
+        if is_partial(slot_state[s]):
             return True
     return False
 
@@ -278,6 +310,24 @@ def sum_row(
             total = float(slot_winding[s])
 
 
+@wp.func
+def keep_slopes(
+    pixels: wp.array2d[wp.float32],
+    slot_state: wp.array[wp.int32],
+    first: wp.int32,
+    last: wp.int32,
+    row: wp.int32,
+    rows: wp.int32,
+):
+    """Make coverages of ALIGNED slots positive and never quite 0 or 1, so that they have a gradient."""
+    for s in range(first, last):
+        if slot_state[s] & constants.ALIGNED != 0:
+            columns = int(constants.TILE)  # not unrolled, which takes registers
+            for x in range(columns):
+                for p in range(constants.TILE * x + row, constants.TILE * x + row + rows):
+                    pixels[s, p] = wp.clamp(wp.abs(pixels[s, p]), constants.NEARLY_NONE, constants.NEARLY_ALL)
+
+
 @functools.cache
 def make_forward(column: Any) -> wp.Kernel:
     """Return the kernel that computes coverages, for vectors of type ``column``.
@@ -304,7 +354,7 @@ def make_forward(column: Any) -> wp.Kernel:
         vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
         vertex: wp.array[wp.vec2],  # [vertex_capacity] px
         # Out:
-        coverage: wp.array2d[column],  # [slot_capacity, columns] signed, in [-1, 1]
+        coverage: wp.array2d[column],  # [slot_capacity, columns] in [-1, 1], signed where not ALIGNED
         coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
     ):
         """Compute the coverage of PARTIAL slots, in rows of tiles with a visible one. One thread a row of
@@ -352,6 +402,7 @@ def make_forward(column: Any) -> wp.Kernel:
         else:
             for y in range(constants.TILE):
                 sum_row(coverage_pixels, slot_state, slot_winding, slot, end, y, rule[shape])
+        keep_slopes(coverage_pixels, slot_state, slot, end, row_first - top, lane_rows)
 
     return fill_forward
 
@@ -384,12 +435,135 @@ def leaves_at(border: wp.int32, a: wp.float32, d: wp.float32, inverse: wp.float3
     return (float(border) - a) * inverse
 
 
+@wp.func
+def winding_of_edge(a: wp.vec2, b: wp.vec2, p: wp.vec2) -> wp.int32:
+    """Return what an edge adds to the winding number of the point ``p``."""
+    turn = crossing(a, b, p[1])
+    if turn != 0:
+        if a[0] + (b[0] - a[0]) / (b[1] - a[1]) * (p[1] - a[1]) >= p[0]:
+            turn = 0
+    return turn
+
+
+@wp.func
+def covers(winding: wp.int32, rule: wp.int32) -> wp.float32:
+    """Return 1 where a winding number is that of the inside, else 0."""
+    if rule == constants.NONZERO:
+        return float(wp.min(wp.abs(winding), 1))
+    return float(winding & 1)
+
+
+@wp.func
+def slopes_beside(
+    vertex: wp.array[wp.vec2],
+    vertex_next: wp.array[wp.int32],
+    vertices: wp.vec2i,
+    rule: wp.int32,
+    p: wp.vec2,
+    d: wp.vec2,
+) -> wp.vec2:
+    """Return half of what a coverage gains by the signed area that an edge along ``d``, moved at ``p``, gains
+    on its one side and then on the other.
+
+    ``vertices``: the shape's, first and last. Where the edge goes down, its first side is the left one: there
+    the winding number is about to be one more.
+    """
+    aside = (BESIDE / (wp.abs(d[0]) + wp.abs(d[1]))) * wp.vec2(-d[1], d[0])
+    before = int(0)
+    after = int(0)
+    for j in range(vertices[0], vertices[1]):
+        a = vertex[j]
+        b = vertex[vertex_next[j]]
+        before += winding_of_edge(a, b, p + aside)
+        after += winding_of_edge(a, b, p - aside)
+    return 0.5 * wp.vec2(
+        covers(before + 1, rule) - covers(before, rule), covers(after, rule) - covers(after - 1, rule)
+    )
+
+
+@wp.func
+def gradient_at(
+    sum_grad: wp.array2d[wp.float32],
+    slot_state: wp.array[wp.int32],
+    first: wp.int32,
+    size: wp.vec2i,
+    x: wp.int32,
+    y: wp.int32,
+) -> wp.float32:
+    """Return the gradient in a pixel of a shape whose slots begin with ``first``, 0 where there is none.
+
+    ``size``: of the shape's tiles [px], from whose corner ``x`` and ``y`` are counted.
+    """
+    if x < 0 or y < 0 or x >= size[0] or y >= size[1]:
+        return 0.0
+    slot = first + (y >> TILE_BITS) * (size[0] >> TILE_BITS) + (x >> TILE_BITS)
+    if not is_partial(slot_state[slot]):
+        return 0.0
+    return sum_grad[slot, constants.TILE * (x & TILE_LAST) + (y & TILE_LAST)]
+
+
+@wp.func
+def is_upright(d: wp.vec2) -> wp.bool:
+    """Return whether an edge that lies on a border of pixels lies on an upright one."""
+    return wp.abs(d[1]) >= wp.abs(d[0])
+
+
+@wp.func
+def sums_along_border(
+    sum_grad: wp.array2d[wp.float32],
+    slot_state: wp.array[wp.int32],
+    first: wp.int32,
+    size: wp.vec2i,
+    vertex: wp.array[wp.vec2],
+    vertex_next: wp.array[wp.int32],
+    vertices: wp.vec2i,
+    rule: wp.int32,
+    start: wp.vec2,
+    corner: wp.vec2,
+    d: wp.vec2,
+) -> wp.vec2:
+    """Return the sum, over the pixels on both sides of an edge on their border, of gradient x part of the
+    edge, and the same x parameter at the middle of that part.
+
+    ``start``: where the edge begins; ``corner``: that of the shape's tiles; see ``gradient_at`` for others.
+    """
+    upright = is_upright(d)
+    border = int(wp.floor(wp.where(upright, start[0] - corner[0], start[1] - corner[1]) + 0.5))
+    a = wp.where(upright, start[1] - corner[1], start[0] - corner[0])
+    length = wp.where(upright, d[1], d[0])
+    # The pixels on the side where the edge, moved there, adds to the area come first.
+    before = border
+    if upright == (length > 0.0):
+        before = border - 1
+    after = 2 * border - 1 - before
+    low = wp.max(wp.min(a, a + length), 0.0)
+    high = wp.min(wp.max(a, a + length), float(wp.where(upright, size[1], size[0])))
+    area = float(0.0)
+    moment = float(0.0)
+    for k in range(int(low), int(wp.ceil(high))):
+        top = wp.max(float(k), low)
+        bottom = wp.min(float(k + 1), high)
+        s = (0.5 * (top + bottom) - a) / length
+        slopes = slopes_beside(vertex, vertex_next, vertices, rule, start + s * d, d)
+        x = wp.where(upright, before, k)
+        y = wp.where(upright, k, before)
+        g = slopes[0] * gradient_at(sum_grad, slot_state, first, size, x, y)
+        x = wp.where(upright, after, k)
+        y = wp.where(upright, k, after)
+        g += slopes[1] * gradient_at(sum_grad, slot_state, first, size, x, y)
+        part = (bottom - top) / wp.abs(length)
+        area += g * part
+        moment += g * part * s
+    return wp.vec2(area, moment)
+
+
 @wp.kernel
 def fill_backward(
     # In:
     offset: wp.int32,
     own_part: wp.int32,  # of the shapes to cover
     part: wp.array[wp.int32],  # [shape_count]
+    rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
     vertex_first: wp.array[wp.int32],  # [shape_count]
@@ -414,49 +588,74 @@ def fill_backward(
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
-    d = vertex[vertex_next[i]] - vertex[i]
+    start = vertex[i]
+    d = vertex[vertex_next[i]] - start
     if slot_last[shape] > slot_first[shape] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
         # From here on, pixels are counted from the corner of the shape's tiles. Those of them that lie
         # outside the canvas have no gradient.
         across = shape_tiles[shape, 2] - shape_tiles[shape, 0]
         wide = constants.TILE * across
         high = constants.TILE * (shape_tiles[shape, 3] - shape_tiles[shape, 1])
-        a = vertex[i] - float(constants.TILE) * wp.vec2(
-            float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1])
-        )
-        span = inside_box(a, d, wp.vec4(0.0, 0.0, float(wide), float(high)))
-        s = span[0]
-        s_end = span[1]
-        x = wp.clamp(int(wp.floor(a[0] + s * d[0])), 0, wide - 1)
-        y = wp.clamp(int(wp.floor(a[1] + s * d[1])), 0, high - 1)
-        # The way to the next pixel, and from a pixel to its border on that side.
-        step_x = int(wp.sign(d[0]))
-        step_y = int(wp.sign(d[1]))
-        ahead_x = (step_x + 1) / 2
-        ahead_y = (step_y + 1) / 2
-        inverse_x = 1.0 / d[0]
-        inverse_y = 1.0 / d[1]
-        s_x = leaves_at(x + ahead_x, a[0], d[0], inverse_x)
-        s_y = leaves_at(y + ahead_y, a[1], d[1], inverse_y)
-        first = slot_first[shape]
-        area = float(0.0)
-        moment = float(0.0)
-        while s < s_end and x >= 0 and x < wide and y >= 0 and y < high:
-            s_next = wp.max(wp.min(wp.min(s_x, s_y), s_end), s)
-            slot = first + (y >> TILE_BITS) * across + (x >> TILE_BITS)
-            if slot_state[slot] == constants.PARTIAL:
-                g = sum_grad[slot, constants.TILE * (x & TILE_LAST) + (y & TILE_LAST)] * (s_next - s)
-                area += g
-                moment += g * (s + s_next)
-            s = s_next
-            if s_x < s_y:
-                x += step_x
-                s_x = (float(x + ahead_x) - a[0]) * inverse_x
-            else:
-                y += step_y
-                s_y = (float(y + ahead_y) - a[1]) * inverse_y
+        corner = float(constants.TILE) * wp.vec2(float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1]))
+        a = start - corner
+        sums = wp.vec2(0.0, 0.0)
+        vertices = wp.vec2i(vertex_first[shape], vertex_last[shape])
+        along = wp.where(is_upright(d), 0, 1)
+        if on_border(start[along], start[along] + d[along]):
+            size = wp.vec2i(wide, high)
+            sums = sums_along_border(
+                sum_grad,
+                slot_state,
+                slot_first[shape],
+                size,
+                vertex,
+                vertex_next,
+                vertices,
+                rule[shape],
+                start,
+                corner,
+                d,
+            )
+        else:
+            span = inside_box(a, d, wp.vec4(0.0, 0.0, float(wide), float(high)))
+            s = span[0]
+            s_end = span[1]
+            x = wp.clamp(int(wp.floor(a[0] + s * d[0])), 0, wide - 1)
+            y = wp.clamp(int(wp.floor(a[1] + s * d[1])), 0, high - 1)
+            # The way to the next pixel, and from a pixel to its border on that side.
+            step_x = int(wp.sign(d[0]))
+            step_y = int(wp.sign(d[1]))
+            ahead_x = (step_x + 1) / 2
+            ahead_y = (step_y + 1) / 2
+            inverse_x = 1.0 / d[0]
+            inverse_y = 1.0 / d[1]
+            s_x = leaves_at(x + ahead_x, a[0], d[0], inverse_x)
+            s_y = leaves_at(y + ahead_y, a[1], d[1], inverse_y)
+            first = slot_first[shape]
+            area = float(0.0)
+            moment = float(0.0)
+            while s < s_end and x >= 0 and x < wide and y >= 0 and y < high:
+                s_next = wp.max(wp.min(wp.min(s_x, s_y), s_end), s)
+                slot = first + (y >> TILE_BITS) * across + (x >> TILE_BITS)
+                state = slot_state[slot]
+                if is_partial(state):
+                    g = sum_grad[slot, constants.TILE * (x & TILE_LAST) + (y & TILE_LAST)] * (s_next - s)
+                    if state & constants.ALIGNED != 0:
+                        middle = start + 0.5 * (s + s_next) * d
+                        slopes = slopes_beside(vertex, vertex_next, vertices, rule[shape], middle, d)
+                        g *= slopes[0] + slopes[1]
+                    area += g
+                    moment += g * (s + s_next)
+                s = s_next
+                if s_x < s_y:
+                    x += step_x
+                    s_x = (float(x + ahead_x) - a[0]) * inverse_x
+                else:
+                    y += step_y
+                    s_y = (float(y + ahead_y) - a[1]) * inverse_y
+            sums = wp.vec2(area, 0.5 * moment)
         move = wp.vec2(-d[1], d[0])
-        at_start = (area - 0.5 * moment) * move
-        at_end = (0.5 * moment) * move
+        at_start = (sums[0] - sums[1]) * move
+        at_end = sums[1] * move
     start_grad[i] = at_start
     end_grad[i] = at_end

@@ -26,6 +26,7 @@ TINY = wp.constant(1.0e-12)
 FLAT = wp.constant(1.0e-4)
 HALF_DIAGONAL = wp.constant(0.70711)  # of a pixel: an edge further away does not cross it
 MARGIN = wp.constant(0.02)  # [px] against rounding
+BORDER_TOLERANCE = wp.constant(8.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
 
 
 @wp.func
@@ -48,11 +49,22 @@ def half_plane(x: wp.float32, n: wp.vec2) -> wp.float32:
 
 
 @wp.func
+def is_side(x: wp.float32) -> wp.bool:
+    """Return whether an upright or level line at ``x`` is a side of the unit square centred at 0."""
+    return wp.abs(wp.abs(x) - 0.5) <= BORDER_TOLERANCE
+
+
+@wp.func
 def half_plane_slope(x: wp.float32, n: wp.vec2) -> wp.float32:
-    """Return the derivative of ``half_plane`` by ``x``: the length of the line inside the square."""
+    """Return the derivative of ``half_plane`` by ``x``: the length of the line inside the square; on its side
+    the mean of what it is to either side.
+    """
     a = wp.max(wp.abs(n[0]), wp.abs(n[1]))
     b = wp.min(wp.abs(n[0]), wp.abs(n[1]))
     distance = wp.abs(x)
+    if b < FLAT:
+        if is_side(x):
+            return 0.5
     if distance >= 0.5 * (a + b):
         return 0.0
     if distance <= 0.5 * (a - b) or b < FLAT:
@@ -73,6 +85,14 @@ def direction(r: wp.vec2, length: wp.float32) -> wp.vec2:
     if length < 1.0e-6:
         return wp.vec2(1.0, 0.0)
     return r / length
+
+
+@wp.func
+def normal(r: wp.vec2, distance: wp.float32, d: wp.vec2) -> wp.vec2:
+    """Return the unit vector of ``r``, of length ``distance``; on the line itself that across ``d``."""
+    if distance < 1.0e-6:
+        return direction(wp.vec2(-d[1], d[0]), wp.length(d))
+    return r / distance
 
 
 @wp.func
@@ -230,10 +250,13 @@ def strip_coverage(centre: wp.vec2, a: wp.vec2, b: wp.vec2, half: wp.float32) ->
     t = nearest(centre, a, b)
     r = centre - (1.0 - t) * a - t * b
     distance = wp.length(r)
-    n = direction(r, distance)
+    n = normal(r, distance, b - a)
     value = half_plane(half - distance, n)
     if half + distance < HALF_DIAGONAL:
         value += half_plane(half + distance, n) - 1.0
+    if wp.min(wp.abs(n[0]), wp.abs(n[1])) < FLAT:
+        if is_side(half - distance) or is_side(half + distance):
+            value = wp.clamp(value, constants.NEARLY_NONE, constants.NEARLY_ALL)
     return value
 
 
@@ -439,7 +462,7 @@ def stroke_backward(
                     t = nearest(centre, a, b)
                     r = centre - (1.0 - t) * a - t * b
                     distance = wp.length(r)
-                    n = direction(r, distance)
+                    n = normal(r, distance, b - a)
                     inner = half_plane_slope(half - distance, n)
                     outer = half_plane_slope(half + distance, n)
                     of_half += g * (inner + outer)

@@ -69,4 +69,4 @@ def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         assert run(*arguments, "--background", background, "--overwrite") == 0
         values = json.loads(capsys.readouterr().out)
         assert values["psnr"] > values["psnr_before"]
-        assert ("<rect" in output.read_text()) == has_one
+        assert ("#fe0" in output.read_text()) == has_one

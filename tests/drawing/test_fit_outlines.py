@@ -144,7 +144,7 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
             figures.append(step.loss_target.mean_square())
             states.append(step.renderer.bins.buffers.tile_cache.numpy().copy())
         step.render()
-        assert step.measured_error() == pytest.approx(step.square_error(), rel=1e-5)
+        assert step.measured_error() == pytest.approx(step.objective.square_error(), rel=1e-5)
         points.append(step.state.scene().points)
         errors.append(figures)
         still.append(states)

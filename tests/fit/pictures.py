@@ -10,6 +10,7 @@ import numpy as np
 from tests.drawing.drawings import seam
 from tests.scenes import forms_scene, mixed_scene, picture_scene, with_gradients
 from warpsplat.extensions import renderer_names
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import canvas_for
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, make_settings
@@ -44,11 +45,12 @@ def step_for(
     base: int = 0,
     weights: FloatArray | None = None,
     capacity: Capacity | None = None,
+    loss: CustomLoss | None = None,
 ) -> Step:
     """Return the first step of a fit of ``scene`` at the finest size."""
     settings = settings or make_settings()
     state = FitState.start(scene, Backend.on(device, threads), np.random.default_rng(0), base=base)
-    target = Target(image, phases(settings, image.shape[1], image.shape[0])[-1], weights)
+    target = Target(image, phases(settings, image.shape[1], image.shape[0])[-1], weights, loss)
     return Step(state, settings, target, capacity=capacity)
 
 
@@ -71,5 +73,5 @@ def steps_of_all_kinds(device: str, threads: int = 1) -> Iterator[Step]:
     radial = (painted.paint == Paint.RADIAL)[:, None]
     layers = np.minimum(np.arange(len(painted)), 1).astype(np.int32)
     layered = replace(painted, frames=np.where(radial, circle, painted.frames), layer=layers)
-    yield step_for(layered, picture(), device, threads=threads)
+    yield step_for(layered, picture(), device, make_settings(loss="edges"), threads=threads)
     yield step_for(forms_scene(64, 48).append(mixed_scene(64, 48)), picture(), device, threads=threads)

@@ -30,8 +30,8 @@ def test_new_shapes_come_where_the_weighted_error_is(kind: Kind, weighted: bool)
     settings = make_settings(kind=kind)
     scene = empty_scene(settings, target)
     scene = replace(scene, canvas=replace(scene.canvas, width=160, height=120))
-    weights = pixel_weights(target, mask, 0.0) if weighted else None
-    added = new_shapes(settings, scene, target, image, 1, np.random.default_rng(0), weights)
+    error = np.square(image - target).sum(axis=2) * (pixel_weights(target, mask, 0.0) if weighted else 1)
+    added = new_shapes(settings, scene, target, error, 1, np.random.default_rng(0))
     assert len(added) == 1
     np.testing.assert_allclose(added.points.mean(axis=0), [32, 92] if weighted else [112, 32], atol=5)
     assert 200 < areas(added)[0] < 1000, "the square has 24 x 24 canvas units"
@@ -67,7 +67,7 @@ def bar_and_disc() -> FloatArray:
 def test_a_bar_gets_a_stroke_and_a_disc_a_fill(mixed: bool) -> None:
     image, settings = bar_and_disc(), make_settings(mixed=mixed)
     scene = empty_scene(settings, image)
-    added = new_shapes(settings, scene, image, np.zeros_like(image), 2, np.random.default_rng(0))
+    added = new_shapes(settings, scene, image, np.square(image).sum(axis=2), 2, np.random.default_rng(0))
     x = np.array([added.points_of(i)[:, 0].mean() for i in range(2)])
     kinds = added.kind[np.argsort(x)].tolist()
     assert kinds == [Kind.STROKE if mixed else Kind.FILL, Kind.FILL]

@@ -47,6 +47,6 @@ def test_an_image_loss(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_shape_loss(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    loss = Loss(lambda settings, canvas: 1.0 / settings.curves, launch_thin, "thinner shapes")
+    loss = Loss(lambda inputs: 1.0 / inputs.settings.curves, launch_thin, "thinner shapes")
     before, after = fits(device, monkeypatch, "SHAPE_LOSSES", loss)
     assert after.opacities.mean() < before.opacities.mean() - 0.05, "over five seeds 0.27 to 0.37 less"

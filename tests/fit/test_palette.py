@@ -69,7 +69,7 @@ def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: b
     def error(colors: FloatArray) -> float:
         step.state.parameters.assign(replace(scene, colors=colors))
         step.render()
-        return step.square_error()
+        return step.objective.value()
 
     least = error(best)
     for channel in range(3):

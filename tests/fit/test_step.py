@@ -15,9 +15,9 @@ from tests.scenes import mixed_scene, with_gradients
 from warpsplat.fit.export import export
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.rounding import evaluate_file
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import LossName, Settings, make_settings
 from warpsplat.metrics import psnr
-from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.backend import GPU_LANES, Backend
 from warpsplat.rendering.renderer import Capacity
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
@@ -78,28 +78,39 @@ def test_every_kernel_is_in_a_captured_step(
     assert launched - every == {"array_scan", "radix_sort_pairs"}
 
 
-@pytest.mark.parametrize("planes", [3, 4])
+@pytest.mark.parametrize(("planes", "loss"), [(3, "ssim"), (4, "l2"), (3, "edges"), (4, "edges")])
 def test_a_step_is_the_same_with_the_lanes_of_a_gpu(
-    device: str, planes: int, monkeypatch: pytest.MonkeyPatch
+    device: str, planes: int, loss: LossName, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Loss, gradients with weighted SSIM, and what densification reads back, but for rounding."""
+    """Loss, gradients with weights, and what densification reads back, but for rounding."""
     rng = np.random.default_rng(0)
     target = rng.uniform(size=(41, 59, planes)).astype(np.float32)
     scene = with_gradients(mixed_scene(59, 41))
     scene = replace(scene, canvas=Canvas(59, 41, None)) if planes == 4 else scene
     weights = rng.uniform(0.5, 1.5, (41, 59)).astype(np.float32)
-    settings, found = make_settings(ssim=0.1, iterations=50), []
-    for gpu_lanes in (False, True):
-        if gpu_lanes:
-            divide_as_on_gpu(monkeypatch)
+    settings, found = make_settings(loss=loss, loss_weight=0.1, iterations=50), []
+    for lanes in (1, 16, GPU_LANES):
+        divide_as_on_gpu(monkeypatch, lanes)
         step = step_for(scene, target, device, settings, weights=weights)
         step.advance()
         gradients = step.renderer.parameters.gradients()
         visible = step.renderer.visible()
-        read = (step.removal_costs(), step.residual(), step.weights(), visible.share, visible.color)
-        found.append([np.array(step.square_error()), np.array(step.psnr()), *gradients.values(), *read])
-    for one, many in zip(*found, strict=True):
-        assert relative_error(many, one) < 1e-4
+        step = step_for(scene, target, device, settings, weights=weights)
+        step.advance()
+        gradients = step.renderer.parameters.gradients()
+        visible = step.renderer.visible()
+        near = step.objective.quadratic()
+        read = (
+            near.removal_costs(),
+            near.residual(),
+            step.objective.by_pixel(),
+            visible.share,
+            visible.color,
+        )
+        found.append([np.array(step.objective.value()), np.array(step.psnr()), *gradients.values(), *read])
+    for one, *others in zip(*found, strict=True):
+        for many in others:
+            assert relative_error(many, one) < 1e-4
 
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])

@@ -34,10 +34,12 @@ from warpsplat.scene import Canvas
 THREADS = 2
 """Of steps: those for one are captured as a graph, which cannot be traced."""
 
-LANES = {1: tile_column, GPU_LANES: quad}
-"""Threads that share a tile, and the vectors of pixels that their kernels are made for."""
+LANES = {1: tile_column, 16: quad, GPU_LANES: quad}
+"""Threads that share a tile, and the vectors of pixels that their kernels are made for. A tile has GPU_LANES
+such vectors, so that there can be no more threads.
+"""
 
-NOT_LAUNCHED: dict[int, set[str]] = {1: {"sum_slots", "sum_lanes", "lane_sums"}, GPU_LANES: set()}
+NOT_LAUNCHED = {tile_column: {"sum_slots", "sum_lanes", "lane_sums"}, quad: set()}
 
 WITHOUT_TORCH = {"tiles_to_pixels", "pixels_to_tiles"} if "torch" in needs.MISSING else set()
 
@@ -56,7 +58,12 @@ def step_results() -> Iterator[Arrays]:
         step.advance()
         renderer, groups = step.renderer, step.state.parameters.groups.values()
         arrays = [array.numpy() for group in groups for array in (group.value, group.grad, group.moment2)]
-        yield [*arrays, renderer.read_image(), step.removal_costs(), renderer.visible().share]
+        yield [
+            *arrays,
+            renderer.read_image(),
+            step.objective.quadratic().removal_costs(),
+            renderer.visible().share,
+        ]
         assert np.isfinite(step.psnr())
 
 
@@ -110,8 +117,8 @@ def unexpected(races: list[Race]) -> list[Race]:
 @pytest.mark.parametrize("lanes", LANES)
 def test_no_two_threads_meet(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the order in which they run, the bits are the same."""
-    if lanes == GPU_LANES:
-        divide_as_on_gpu(monkeypatch)
+    if lanes > 1:
+        divide_as_on_gpu(monkeypatch, lanes)
     usual, shuffled = Tracer(), Tracer(np.random.default_rng(lanes))
     for one, other in zip(results(usual), results(shuffled), strict=True):
         for array, again in zip(one, other, strict=True):
@@ -120,7 +127,7 @@ def test_no_two_threads_meet(lanes: int, monkeypatch: pytest.MonkeyPatch) -> Non
         assert not unexpected(tracer.races)
         assert not tracer.outside, "accesses outside of all arrays"
         every = {kernel.key for kernel in all_kernels(LANES[lanes])}
-        assert every - tracer.kernels <= NOT_LAUNCHED[lanes] | WITHOUT_TORCH
+        assert every - tracer.kernels <= NOT_LAUNCHED[LANES[lanes]] | WITHOUT_TORCH
 
 
 def test_exceptions_are_known() -> None:

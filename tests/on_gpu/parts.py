@@ -99,7 +99,7 @@ def suite(plan: Plan) -> Iterator[Row]:
     if find_spec("xdist") and len(plan.suite) == 1:
         command += ["-n", str(min(8, os.cpu_count() or 1)), "--dist", "worksteal"]
     done = subprocess.run([*command, *plan.suite], cwd=ROOT, capture_output=True, text=True, check=False)
-    lines = [line for line in done.stdout.splitlines() if line.strip()]
+    lines = [line for line in (done.stdout or done.stderr).splitlines() if line.strip()]
     for line in lines:
         if line.startswith(("FAILED", "ERROR")):
             yield Row("a test", line[:200].replace("|", "/"), passed=False)

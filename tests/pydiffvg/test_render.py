@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from tests.pydiffvg.helpers import SIZE, blob, group, on_white, psnr, render, scene, shown, tensor
+from tests.pydiffvg.helpers import COLOR, SIZE, blob, group, on_white, psnr, render, scene, shown, tensor
 from warpsplat import pydiffvg
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg import device as first_device
@@ -78,12 +78,12 @@ def test_background(opacity: float | None) -> None:
     image = render([shape], [fill], below)
     through = 0.75 * (opacity or 1.0)
     total = 0.25 + through
-    blue = (0.25 * 0.8 + through * 0.6) / total
+    blue = (0.25 * 0.8 + 0.75 * 0.6) / total  # behind shapes the background counts as premultiplied
     assert image[22, 20, 2:].tolist() == pytest.approx([blue, total], abs=1e-5)
     assert torch.allclose(image[2, 2], tensor(0.6, 0.6, 0.6, opacity or 1.0), atol=1e-5)
     (grad,) = torch.autograd.grad(image[22, 20, 2], below)
     assert grad.shape == below.shape
-    assert float(grad[22, 20, 2]) == pytest.approx(through / total, abs=1e-4)
+    assert float(grad[22, 20, 2]) == pytest.approx(0.75 / total, abs=1e-4)
 
 
 @pytest.mark.parametrize("size", [(2 * SIZE, 2 * SIZE), (2 * SIZE, SIZE)])
@@ -167,17 +167,15 @@ def test_gradients_are_those_of_differences(name: str) -> None:
         assert found == pytest.approx(expected, rel=0.03, abs=0.03 * float(gradient.norm()))
 
 
-TENT = pydiffvg.PixelFilter(FilterType.tent, tensor(1.0))
+NO_WEIGHTS = pydiffvg.PixelFilter(FilterType.tent, tensor(0.0))
 OPEN = pydiffvg.Path(torch.tensor([2, 2]), torch.zeros(6, 2), False)
 NO_POINT = pydiffvg.Circle(tensor(float("nan")), tensor(9, 9))
 REFUSED: dict[str, Callable[[], object]] = {
-    "signed distances": lambda: serialize([blob()], output_type=pydiffvg.OutputType.sdf),
-    "signed distances .*eval_positions": lambda: serialize([blob()], eval_positions=torch.zeros(3, 2)),
-    "pixel filter tent of radius 1 ": lambda: serialize([blob()], filter=TENT),
+    "eval_positions are of signed distances": lambda: serialize([blob()], eval_positions=torch.zeros(3, 2)),
+    "no pixel filter tent of radius 0": lambda: serialize([blob()], filter=NO_WEIGHTS),
     "group 0 names shape 0, there are 0": lambda: serialize([]),
     "shape 0 has 6 points, its num_control_points .* ask for 7": lambda: serialize([OPEN]),
     "center of shape 0 has shape": lambda: serialize([pydiffvg.Circle(tensor(1.0), torch.zeros(3))]),
-    "render_grad": pydiffvg.RenderFunction.render_grad,
     "a point of a shape is not finite": lambda: render([NO_POINT], [group()]),
     "background_image has shape": lambda: render([blob()], [group()], torch.zeros(SIZE, 9, 4)),
     "takes what RenderFunction.serialize_scene gave": lambda: pydiffvg.RenderFunction.apply(*range(9)),
@@ -261,3 +259,16 @@ def test_gradients_can_be_zeroed_in_place_and_optimised() -> None:
     assert shapes[0].p_min.grad is None and shapes[3].points.grad is None  # type: ignore[union-attr]
     with torch.no_grad():
         assert not render(shapes, groups).requires_grad
+
+
+def test_arguments_in_other_forms() -> None:
+    """Lists for tensors of whole numbers, colours as columns, and more points than the segments need."""
+    wanted = render([blob()], [group()])
+    shape = blob()
+    more = torch.cat([shape.points, torch.zeros(3, 2)]).requires_grad_()
+    path: Any = pydiffvg.Path([2, 2], more, True)
+    column: Any = pydiffvg.ShapeGroup([0], tensor(*COLOR)[:, None])
+    image = render([path], [column])
+    torch.testing.assert_close(image, wanted)
+    image.sum().backward()
+    assert more.grad is not None and more.grad[:6].any() and not more.grad[6:].any()

@@ -43,9 +43,10 @@ for t in range(int(sys.argv[1])):
 pydiffvg.imwrite(image.cpu(), 'results/fit/final.png', gamma=1.0)
 """
 
-DISTANCES = """
+UNKNOWN_SHAPE = """\
 import pydiffvg
-pydiffvg.RenderFunction.serialize_scene(8, 8, [], [], output_type=pydiffvg.OutputType.sdf)
+import torch
+pydiffvg.RenderFunction.serialize_scene(9, 9, [], [pydiffvg.ShapeGroup(torch.tensor([3]), None)])
 """
 
 
@@ -81,11 +82,11 @@ def test_a_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_is_not_supported_is_one_line_with_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    script = tmp_path / "distances.py"
-    script.write_text(DISTANCES, encoding="utf-8")
+    script = tmp_path / "unknown.py"
+    script.write_text(UNKNOWN_SHAPE, encoding="utf-8")
     assert main([str(script)]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(f"error: {script}:3: signed distances") and error.count("\n") == 1
+    assert error.startswith(f"error: {script}:3: group 0 names shape 3") and error.count("\n") == 1
 
 
 def test_no_script(capsys: pytest.CaptureFixture[str]) -> None:

@@ -66,9 +66,10 @@ def outcome(case: str, device: str, **division: int) -> list[np.ndarray]:
 @by_case
 def test_the_lanes_of_a_gpu_do_what_one_does(device: str, case: str) -> None:
     """A GPU's vectors of pixels are shorter than a CPU's."""
-    both = (outcome(case, device, lanes=lanes) for lanes in (1, GPU_LANES))
-    for one, many in zip(*both, strict=True):
-        assert relative_error(many, one) < (1e-4 if "opaque" in case else 2e-5)
+    by_lanes = (outcome(case, device, lanes=lanes) for lanes in (1, 16, GPU_LANES))
+    for one, *others in zip(*by_lanes, strict=True):
+        for many in others:
+            assert relative_error(many, one) < (1e-4 if "opaque" in case else 2e-5)
 
 
 @by_case

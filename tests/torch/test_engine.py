@@ -12,9 +12,10 @@ import pytest
 import torch
 
 from tests.scenes import random_scene, styled_scene
+from warpsplat.errors import UsageError
 from warpsplat.rendering import kernel_cache
 from warpsplat.scene import Cap, Join, Kind, Scene
-from warpsplat.torch import SceneTensors, clear_cache, engine, render
+from warpsplat.torch import SceneTensors, clear_cache, engine, passes, render
 
 
 def step(scene: Scene, width: int = 40) -> torch.Tensor:
@@ -86,3 +87,56 @@ def test_many_steps_need_no_more_memory() -> None:
         if number == 30:
             before = resident()
     assert resident() - before < 4e6
+
+
+@pytest.fixture
+def capturing(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
+    """Pretend that a CUDA graph is being captured: everything but CUDA's own part."""
+
+    def pretend(value: bool) -> None:
+        for module in (engine, passes):
+            monkeypatch.setattr(module, "is_capturing", lambda device: value)
+
+    return pretend
+
+
+def test_a_captured_engine_stays_as_it_is(capturing: Callable[[bool], None]) -> None:
+    """A graph replays its launches without a call, whatever other calls do meanwhile."""
+    scene = random_scene(Kind.FILL, 3)
+    wanted = step(scene)
+    (warm,) = engine.engines.values()
+    capturing(True)
+    assert torch.equal(step(scene), wanted)
+    launches = warm._renderer.forward_program
+    with np.errstate(all="ignore"):
+        crowded = replace(scene, points=40 * scene.points - 800)
+        nowhere = replace(scene, points=scene.points * np.float32("nan"))
+    for one in (crowded, nowhere):  # nothing is read back, so nothing grows, and nothing is refused
+        render(SceneTensors.of(one), 40)
+    assert warm._renderer.forward_program is launches
+    capturing(False)
+    step(scene)
+    assert warm not in engine.engines.values()
+    assert list(engine.captured.values()) == [warm]
+    clear_cache()
+    assert not engine.captured
+
+
+def test_opacities_in_a_graph_stay_where_their_adjoint_is_right(capturing: Callable[[bool], None]) -> None:
+    scene = random_scene(Kind.FILL, 3)
+    opaque = replace(scene, opacities=np.ones(3, np.float32))
+    step(scene)
+    capturing(True)
+    tensors = SceneTensors.of(opaque, requires_grad=True)
+    image = render(tensors, 40)
+    image.sum().backward()
+    gradients = [value.grad for value in tensors.values.values() if value.grad is not None]
+    assert all(gradient.isfinite().all() for gradient in gradients)
+    capturing(False)
+    assert (image - render(tensors, 40)).abs().max() < 3e-3
+
+
+def test_a_graph_of_what_was_not_rendered_before_is_refused(capturing: Callable[[bool], None]) -> None:
+    capturing(True)
+    with pytest.raises(UsageError, match="rendered before"):
+        step(random_scene(Kind.FILL, 3))

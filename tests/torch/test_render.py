@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -15,13 +15,12 @@ import torch
 
 from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
-from warpsplat.errors import UsageError
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.torch import SceneTensors, over, render
+from warpsplat.torch import SceneTensors, over, render, tensors
 
 FILL = Kind.FILL
 
@@ -149,6 +148,23 @@ def test_several_threads_find_what_one_finds(threads: int) -> None:
                 assert_equal(gradient, want)
 
 
+def test_a_scene_is_drawn_as_its_tensors_are() -> None:
+    scene = random_scene(FILL)
+    assert_equal(render(scene), render(SceneTensors.of(scene)))
+    assert_equal(render([scene, moved(scene, 1.0)])[0], render(scene))
+
+
+def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tensors, "_warn_of_float64", functools.cache(tensors._warn_of_float64.__wrapped__))
+    scene = moved(random_scene(FILL), 0.0)
+    double = scene.values["points"].detach().double().requires_grad_()
+    with pytest.warns(UserWarning, match="float32"):
+        render(SceneTensors(scene.layout, {"points": double}))
+    (gradient,) = torch.autograd.grad(loss_of(SceneTensors(scene.layout, {"points": double})), [double])
+    assert gradient.dtype == torch.float64
+    assert_equal(gradient.float(), points_grad(loss_of(scene), scene))
+
+
 def test_over() -> None:
     scene = random_scene(FILL)
     clear = render(SceneTensors.of(replace(scene, canvas=Canvas(40, 36, None))))
@@ -162,41 +178,3 @@ def test_without_torch_one_line_says_what_to_do() -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
     assert done.stderr.splitlines()[-1] == message
-
-
-SPLINES, ONES = mixed_scene(seed=1), torch.ones(4, dtype=torch.float32)
-
-
-def refused(**options: Any) -> Callable[[], object]:
-    return lambda: render(SceneTensors(SPLINES, {}), **options)
-
-
-def values(**changed: Any) -> Callable[[], object]:
-    return lambda: render(SceneTensors(random_scene(FILL), changed))
-
-
-REFUSED: dict[str, tuple[type[Exception], Callable[[], object]]] = {
-    "no attribute 'colour'": (ValueError, values(colour=torch.zeros(4))),
-    r"colors has shape \(3,\), not \(4, 3\)": (ValueError, values(colors=torch.zeros(3).float())),
-    "colors is torch.float64": (TypeError, values(colors=torch.zeros(4, 3).double())),
-    "colors is a ndarray": (TypeError, values(colors=np.zeros((4, 3), np.float32))),
-    "colors is on meta": (
-        ValueError,
-        values(opacities=ONES, colors=torch.zeros(4, 3, device="meta").float()),
-    ),
-    "colors: numbers that are not finite": (ValueError, values(colors=torch.zeros(4, 3).float() / 0)),
-    "focus has no gradient": (ValueError, values(focus=torch.zeros(4, 3).float().requires_grad_())),
-    "width must be a whole number": (UsageError, refused(width=0)),
-    "do not have the proportions": (UsageError, refused(width=40, height=72)),
-    "not 'fast'": (UsageError, refused(renderer="fast")),
-    "is a spline": (ValueError, refused(renderer="splat")),
-    "no scene": (UsageError, lambda: render([])),
-}
-
-
-@pytest.mark.parametrize("message", REFUSED)
-def test_what_is_refused_in_one_line(message: str) -> None:
-    kind, call = REFUSED[message]
-    with pytest.raises(kind, match=message) as raised:
-        call()
-    assert "\n" not in str(raised.value)

@@ -1,4 +1,4 @@
-"""What holds a drawing's outlines together: lines, smooth joints, level and upright parts, borders."""
+"""Constraints that hold outlines together: lines, smooth joints, level and upright parts, borders."""
 
 from __future__ import annotations
 

@@ -19,10 +19,10 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
 
-SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5e-4, 2e-6
-"""What the fit of a trace takes on one core, roughly [s]."""
+SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5.5e-4, 1.5e-6
+"""Rough time of fitting a trace on one core [s]."""
 
-LONG = 10.0
+LONG = 4.0
 """Time from which on it is announced [s]."""
 
 log = logging.getLogger(__name__)
@@ -67,7 +67,7 @@ def warn_if_long(traced: Drawing, problem: Problem) -> None:
     seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
     if seconds > LONG:
         log.warning(
-            "a drawing of %s nodes takes about %.0f s; --time-budget or --quality draft make it shorter",
+            "fitting its %s nodes takes about %.0f s; --time-budget or --quality draft make it shorter",
             f"{nodes:,}",
             seconds,
         )
@@ -112,7 +112,15 @@ def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
     size = enlargement(problem.target)
     scene = enlarged(done.drawing.scene, size, *problem.size)
-    made = as_fit(scene, done.per_pixel / size, problem, run)
+    if problem.settings.strokes and not run.over():
+        from warpsplat.drawing.pen import with_strokes
+
+        scene = with_strokes(scene, problem.settings, run)
+    per_pixel = done.per_pixel / size
+    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)):
+        made = as_fit(scene, per_pixel, problem, run)
+    else:  # nothing to compare it with
+        made = Fit(scene, per_pixel, done.psnr, done.psnr, 0, run.stopped())
     return Sketch(made, _size(made, problem.settings), done.drawing)
 
 

@@ -34,7 +34,7 @@ class Edits:
     at: Links
     """The cubic; ``WITHOUT`` makes it part of the one before."""
     handles: Floats
-    """Of the piece that it makes, shape (edit, 2, 2); of others nothing."""
+    """Handles of the piece that an edit makes, shape (edit, 2, 2); unused by others."""
     axis: npt.NDArray[np.intp]
     """The coordinate that a line or a tangent has in common."""
     value: Floats

@@ -16,7 +16,7 @@ from warpsplat.svg.primitives import Primitive
 Floats = npt.NDArray[np.float64]
 
 ROUNDS, ROUGH_ROUNDS = 12, 4  # of Gauss and Newton's method, and those that tell what is far from any shape
-STEP = 1e-4  # [px] of numeric derivatives
+STEP = 1e-4  # [px] of numeric derivatives of boxes by sizes
 DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
 TOGETHER = 64  # outlines that are handled at once: their arrays stay in the processor's cache
 LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
@@ -26,7 +26,7 @@ FIRST_REACH, LAST_REACH = (
 )  # [half the size] at first, [px] in the end: samples farther off count little
 
 
-class Samples(NamedTuple):
+class OutlinePoints(NamedTuple):
     """Points of outlines with equally many of them."""
 
     points: Floats
@@ -34,9 +34,9 @@ class Samples(NamedTuple):
     weights: Floats
     """By which squared distances count: what a distance costs in the image, shape (outline, sample)."""
 
-    def take(self, rows: npt.NDArray[np.intp]) -> Samples:
+    def take(self, rows: npt.NDArray[np.intp]) -> OutlinePoints:
         """Return those of some outlines."""
-        return Samples(self.points[rows], self.weights[rows])
+        return OutlinePoints(self.points[rows], self.weights[rows])
 
 
 @dataclass(frozen=True)
@@ -83,19 +83,36 @@ def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
         half: Half the sides, shape (outline, 2).
         radii: Shape (outline, 2); unequal ones only of ellipses.
     """
+    return distances_and_slopes(points, half, radii)[0]
+
+
+def distances_and_slopes(points: Floats, half: Floats, radii: Floats) -> tuple[Floats, Floats]:
+    """Return ``distances`` and their derivatives, those of ellipses about right near the outline.
+
+    Shape (5, outline, sample): by the coordinates' amounts, half the sides, and the radius.
+    """
     x, y = np.abs(points[..., 0]), np.abs(points[..., 1])
     a, b = half[:, :1], half[:, 1:]
     is_ellipse = (radii == half).all(axis=1, keepdims=True)
-    elliptic = boxed = x
+    found: list[tuple[Floats, Floats]] = []
     if is_ellipse.any():
-        level = np.maximum(hypot(x / a, y / b), 1e-9)
-        slope = np.maximum(hypot(x / (a * a), y / (b * b)), 1e-9)
-        elliptic = (level - 1) * level / slope
+        u, v = x / a, y / b
+        level = np.maximum(hypot(u, v), 1e-9)
+        slope = np.maximum(hypot(u / a, v / b), 1e-9)
+        across = np.stack([u / a, v / b]) / (level * slope)
+        slopes = np.concatenate([across, -across * np.stack([u, v]), np.zeros_like(x)[None]])
+        found.append(((level - 1) * level / slope, slopes))
     if not is_ellipse.all():
         r = radii[:, :1]
         u, v = x - (a - r), y - (b - r)
-        boxed = hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0) - r
-    return np.where(is_ellipse, elliptic, boxed)
+        outside = np.maximum(np.stack([u, v]), 0)
+        away = hypot(*outside)
+        nearer = np.stack([u >= v, u < v])
+        across = np.where(away > 0, outside / np.maximum(away, 1e-9), nearer)
+        slopes = np.concatenate([across, -across, across.sum(axis=0)[None] - 1])
+        found.append((away + np.minimum(np.maximum(u, v), 0) - r, slopes))
+    (off, slopes), (other_off, other_slopes) = found[0], found[-1]
+    return np.where(is_ellipse, off, other_off), np.where(is_ellipse, slopes, other_slopes)
 
 
 class Fits(NamedTuple):
@@ -109,16 +126,18 @@ class Fits(NamedTuple):
     """Distances of the samples, shape (outline, sample) [px]."""
 
 
-def nearest(family: Family, samples: Samples, begun: Floats | None = None, rounds: int = ROUNDS) -> Fits:
+def nearest(
+    family: Family, samples: OutlinePoints, begun: Floats | None = None, rounds: int = ROUNDS
+) -> Fits:
     """Return the shapes of a family nearest to most of the samples, by weighted least squares.
 
-    Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
+    OutlinePoints far off count little: another shape may hide what is there (Geman and McClure 1987).
 
     ``begun``: values after ``ROUGH_ROUNDS``, shape (outline, value); without, those of the samples' boxes.
     """
     parts = []
     for i in range(0, len(samples.points), TOGETHER):
-        part = Samples(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
+        part = OutlinePoints(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
         if begun is None:
             parts.append(_nearest(family, part, _start(family, part), range(rounds)))
         else:
@@ -126,31 +145,38 @@ def nearest(family: Family, samples: Samples, begun: Floats | None = None, round
     return Fits(*(np.concatenate(own) for own in zip(*parts, strict=True)))
 
 
-def _nearest(family: Family, samples: Samples, values: Floats, rounds: range) -> Fits:
+def _nearest(family: Family, samples: OutlinePoints, values: Floats, rounds: range) -> Fits:
     """Return the nearest shapes of a family from ``values`` on, as ``nearest``."""
     points, weights = samples
     size = _start(family, samples)[:, 2:].max(axis=1)
     unit = np.eye(values.shape[1])
 
-    def off(values: Floats) -> Floats:
+    def off(values: Floats) -> tuple[Floats, Floats]:
+        """Return the distances, and their derivatives by the values, shape (value, outline, sample)."""
         half, radii = family.boxes(values[:, 2:])
-        return distances(points - values[:, None, :2], half, radii)
+        away = points - values[:, None, :2]
+        here, (across_x, across_y, *by_box) = distances_and_slopes(away, half, radii)
+        slopes = [-np.sign(away[..., 0]) * across_x, -np.sign(away[..., 1]) * across_y]
+        for axis in unit[2:, 2:]:
+            moved_half, moved_radii = family.boxes(values[:, 2:] + STEP * axis)
+            moved = [*((moved_half - half) / STEP).T, ((moved_radii - radii) / STEP)[:, 0]]
+            slopes.append(sum(share[:, None] * slope for share, slope in zip(moved, by_box, strict=True)))
+        return here, np.stack(slopes)
 
     for number in rounds:
         reach = np.maximum(FIRST_REACH * size / (1 << number), LAST_REACH if number else 0)
-        here = off(values)
-        slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit], axis=2)
+        here, slopes = off(values)
         trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2
-        weighted = slopes * trust[..., None]
-        system = np.stack([(weighted * slopes[..., k, None]).sum(axis=1) for k in range(len(unit))], axis=1)
+        weighted = slopes * trust
+        system = np.stack([(weighted * slope).sum(axis=2) for slope in slopes]).transpose(2, 0, 1)
         stiffness = np.diagonal(system, axis1=1, axis2=2)
         damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
-        values = values - solve(damped, (weighted * here[..., None]).sum(axis=1)[..., None])[..., 0]
+        values = values - solve(damped, (weighted * here).sum(axis=2).T[..., None])[..., 0]
         values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
-    return Fits(values, stiffness, off(values))
+    return Fits(values, stiffness, off(values)[0])
 
 
-def _start(family: Family, samples: Samples) -> Floats:
+def _start(family: Family, samples: OutlinePoints) -> Floats:
     """Return centres and sizes from the samples' boxes, shape (outline, value)."""
     low, high = samples.points.min(axis=1), samples.points.max(axis=1)
     center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)

@@ -19,7 +19,7 @@ from warpsplat.drawing.primitive_fits import (
     TOGETHER,
     Family,
     Fits,
-    Samples,
+    OutlinePoints,
     nearest,
     shape_of,
 )
@@ -68,12 +68,12 @@ Errors = Callable[[Drawing], Floats]
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ShapeCandidate:
     """A basic shape in place of a contour."""
 
     contour: int
     cubics: Floats
-    """Of the contour, shape (piece, 4, 2)."""
+    """Cubics of the contour, shape (piece, 4, 2)."""
     family: Family
     values: Floats
     """Shape (value,)."""
@@ -115,7 +115,7 @@ def with_shapes(
     return drawing
 
 
-def _cells(candidates: Sequence[Candidate]) -> dict[int, Cells]:
+def _cells(candidates: Sequence[ShapeCandidate]) -> dict[int, Cells]:
     """Return the cells that each candidate changes, by its contour."""
     found = {}
     for first in range(0, len(candidates), TOGETHER):
@@ -128,7 +128,7 @@ def _cells(candidates: Sequence[Candidate]) -> dict[int, Cells]:
     return found
 
 
-def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Candidate]:
+def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[ShapeCandidate]:
     """Return the basic shape of each contour that is near to one, the cheapest by error and bytes."""
     scene = drawing.scene
     pieces = np.diff(scene.starts) // 3
@@ -141,7 +141,7 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
     if not len(contours):
         return []
     areas, sizes = _areas(samples.points), _sizes(drawing)[contours]
-    found: dict[int, Candidate] = {}
+    found: dict[int, ShapeCandidate] = {}
     least = np.full(len(contours), np.inf)
     for family in FAMILIES:
         # Families come by size: a shape that costs less than the size of the next one alone is the best.
@@ -158,19 +158,21 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Cand
             i = int(rows[k])
             contour, saved = int(contours[i]), float(sizes[i]) - family.size
             values = fits.values[k], fits.stiffness[k]
-            found[i] = Candidate(
+            found[i] = ShapeCandidate(
                 contour, cubics_of(scene, contour), family, *values, bool(areas[i] > 0), saved
             )
         least[rows] = np.minimum(least[rows], costs)
     return [found[i] for i in sorted(found)]
 
 
-def _likely(family: Family, rows: IndexArray, samples: Samples, most: Floats) -> tuple[IndexArray, Floats]:
+def _likely(
+    family: Family, rows: IndexArray, samples: OutlinePoints, most: Floats
+) -> tuple[IndexArray, Floats]:
     """Return which of the outlines ``rows`` may become shapes of a family, and the values that these have.
 
     Few samples and rounds tell. ``most``: the errors that the bytes saved are worth, by outline.
     """
-    few = Samples(samples.points[rows, ::FEWER], samples.weights[rows, ::FEWER])
+    few = OutlinePoints(samples.points[rows, ::FEWER], samples.weights[rows, ::FEWER])
     fits = nearest(family, few, rounds=ROUGH_ROUNDS)
     off = np.abs(fits.off)
     cost = FEWER * (few.weights * np.minimum(off, MOST_OFF) ** 2).sum(axis=1)
@@ -197,7 +199,7 @@ def _points_along(scene: Scene, contours: IndexArray) -> Floats:
     return np.asarray(points_at(cubics, (place - piece)[..., None])[..., 0, :])
 
 
-def with_equal_values(candidates: list[Candidate], worth: float) -> list[Candidate]:
+def with_equal_values(candidates: list[ShapeCandidate], worth: float) -> list[ShapeCandidate]:
     """Return candidates with equal sizes and places where they differ by less than a number is worth.
 
     Values of one kind are merged in pairs, those first that cost least (Ward 1963).
@@ -248,7 +250,7 @@ def merge_near(values: Floats, stiffness: Floats, price: float) -> tuple[Floats,
     return found, counts
 
 
-def _samples(target: FloatArray, points: Floats) -> tuple[Samples, npt.NDArray[np.bool_]]:
+def _samples(target: FloatArray, points: Floats) -> tuple[OutlinePoints, npt.NDArray[np.bool_]]:
     """Return points of contours with their weights, and which of the contours mostly show.
 
     A distance of 1 px along 1 px costs the squared difference of the colours on both sides, as a share of the
@@ -267,7 +269,7 @@ def _samples(target: FloatArray, points: Floats) -> tuple[Samples, npt.NDArray[n
     shows = contrast > SEEN
     seen = (lengths * shows).sum(axis=1) >= LEAST_SEEN * lengths.sum(axis=1)
     weights = np.where(shows, contrast, 0) * lengths / (3 * width * height)
-    return Samples(points, weights.astype(np.float64)), seen
+    return OutlinePoints(points, weights.astype(np.float64)), seen
 
 
 def _areas(points: Floats) -> Floats:
@@ -285,7 +287,7 @@ def _sizes(drawing: Drawing) -> Floats:
     return MOVE_BYTES + summed(owner, size, len(starts) - 1)
 
 
-def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: float) -> Floats:
+def _costs(family: Family, fits: Fits, samples: OutlinePoints, areas: Floats, worth: float) -> Floats:
     """Return the cost of each shape of a family, in error and bytes; infinite where it is too far off."""
     far = np.abs(fits.off) > MOST_OFF
     shown = samples.weights > 0
@@ -296,7 +298,7 @@ def _costs(family: Family, fits: Fits, samples: Samples, areas: Floats, worth: f
     return np.where(near & (same | (far | ~shown).any(axis=1)), cost, np.inf)
 
 
-def _replaced(drawing: Drawing, chosen: Sequence[Candidate]) -> Drawing:
+def _replaced(drawing: Drawing, chosen: Sequence[ShapeCandidate]) -> Drawing:
     """Return a drawing with basic shapes in place of contours."""
     cubics = primitive_cubics([one.made for one in chosen])
     joints = joints_of([Pieces(own, _is_line(own)) for own in cubics])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from warpsplat.drawing.nodes import Outlines, apart, applied
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
 from warpsplat.fit.rounding import byte_worth
+from warpsplat.metrics import decibels
 from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
@@ -69,6 +71,8 @@ class Finished(NamedTuple):
     """Rounded to the grid."""
     per_pixel: float
     """View box units per pixel."""
+    psnr: float = math.nan
+    """Of the exact render before it is rounded [dB]; NaN if it was not fitted."""
 
 
 def finish_drawing(
@@ -110,7 +114,7 @@ def finish_drawing(
         if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
     if run.over():
-        return Finished(fit.drawing, min(DRAFT_GRID, finest))
+        return Finished(fit.drawing, min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
     grid = drawing_grid(fit, finest, price)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
@@ -119,7 +123,7 @@ def finish_drawing(
     fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
     drawing = fit.drawing
     low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
-    return Finished(replace(drawing, scene=low), grid)
+    return Finished(replace(drawing, scene=low), grid, decibels(fit.error * 255**2))
 
 
 def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int) -> None:

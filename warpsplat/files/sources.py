@@ -25,19 +25,21 @@ class Readable(Protocol):
         """Return bytes or text."""
 
 
-ImageSource = str | os.PathLike[str] | bytes | Readable | Image.Image | npt.NDArray[Any]
+BytesLike = bytes | bytearray | memoryview
+
+ImageSource = str | os.PathLike[str] | BytesLike | Readable | Image.Image | npt.NDArray[Any]
 """A file's path, an image file's bytes, a file open for reading, a Pillow image, or pixels: uint8, uint16,
 bool, or floats in [0, 1], shape (height, width) or (height, width, channels): grey, grey and opacity, RGB, or
 RGB and straight opacity."""
 
 
-def source_bytes(source: str | os.PathLike[str] | bytes | Readable, what: str = "an image") -> bytes:
+def source_bytes(source: str | os.PathLike[str] | BytesLike | Readable, what: str = "an image") -> bytes:
     """Return the content of a path, bytes or an open file.
 
     Raises:
         ImageError: It cannot be read, is empty or larger than ``MAX_INPUT``.
     """
-    if isinstance(source, (bytes, bytearray, memoryview)):
+    if isinstance(source, BytesLike):
         return bytes(source)
     if isinstance(source, (str, os.PathLike)):
         return read_input(Path(source), what)
@@ -60,7 +62,7 @@ def held(source: ImageSource) -> ImageSource:
     Raises:
         ImageError: As ``source_bytes``.
     """
-    return source_bytes(source) if isinstance(source, (str, os.PathLike, bytes, Readable)) else source
+    return source_bytes(source) if isinstance(source, (str, os.PathLike, BytesLike, Readable)) else source
 
 
 def source_name(source: object, default: str = "the image") -> str:
@@ -99,7 +101,7 @@ def image_of(
         TypeError: Not an ``ImageSource``.
     """
     name = name or source_name(source)
-    if isinstance(source, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
+    if isinstance(source, (str, os.PathLike, BytesLike, Readable)):
         with decoded(source_bytes(source), name, factor) as (image, left):
             return reduced(image, paper, left, name)
     try:

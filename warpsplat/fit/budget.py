@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import USUAL_GRID, choose_grid, finest
 from warpsplat.fit.schedule import CHECK_INTERVAL, mean_points_at, phases
@@ -48,10 +49,12 @@ class Budget:
         """Return whether the time is up."""
         return time.monotonic() > self.deadline
 
-    def measure(self, state: FitState, settings: Settings, image: FloatArray) -> Settings:
+    def measure(
+        self, state: FitState, settings: Settings, image: FloatArray, loss: CustomLoss | None = None
+    ) -> Settings:
         """Time a few steps at each size without updates; return ``settings`` with as many steps as fit."""
         for phase in phases(settings, image.shape[1], image.shape[0]):
-            step = Step(state, settings, Target(image, phase))
+            step = Step(state, settings, Target(image, phase, loss=loss))
             begin = time.monotonic()
             step.time(TIMED_STEPS)
             self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)

@@ -35,7 +35,7 @@ def densify(step: Step, *, grows: bool) -> Step:
     """
     settings, state = step.settings, step.state
     step.renderer.forward_complete()
-    costs = step.removal_costs()
+    costs = step.objective.quadratic().removal_costs()
     if settings.paint != "flat" and repaints_at(settings, state.step):
         choose_paints(step)
     scene = state.scene()
@@ -60,8 +60,8 @@ def replace_shapes(step: Step, scene: Scene, keep: IndexArray, added: Scene, cou
     state, target = step.state, step.target
     missing = count - len(keep) - len(added)
     if missing > 0:
-        image = step.renderer.read_image()
-        new = new_shapes(step.settings, scene, target.image, image, missing, state.rng, target.weights)
+        error = step.objective.by_pixel()
+        new = new_shapes(step.settings, scene, target.image, error, missing, state.rng)
         added = added.append(new)
     if state.base:
         layer = int(scene.layer[: state.base].max()) + 1
@@ -80,7 +80,7 @@ def remove_surplus(step: Step, count: int) -> Step:
         if excess <= 0:
             break
         step.render()
-        costs = step.removal_costs()
+        costs = step.objective.quadratic().removal_costs()
         costs[: state.base] = np.inf
         removed = np.argsort(costs, kind="stable")[: -(-excess // rounds_left)]
         none = state.scene().take(np.arange(0))

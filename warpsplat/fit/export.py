@@ -9,8 +9,8 @@ from PIL import Image
 
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.scene import Scene
-from warpsplat.svg.viewer import render_own, render_svg
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
 from warpsplat.svg.write import minified, shortened, write_svg
 
 
@@ -42,6 +42,12 @@ def shown_paths(scene: Scene, settings: Settings) -> Scene:
     renderer = renderer_of(settings.renderer)
     paths = renderer.to_paths(scene, settings)
     return replace(paths, opacities=paths.opacities * np.float32(renderer.opacity_scale))
+
+
+def shown_image(text: str, scene: Scene, planes: int) -> FloatArray:
+    """Return ``show``'s drawing as a target is given: sRGB in [0, 1], shape (height, width, planes)."""
+    drawn = show(text, scene)
+    return np.asarray((on_white(drawn) if planes == 3 else premultiplied(drawn)) / 255)
 
 
 def show(text: str, scene: Scene) -> Image.Image:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.alpha import squares, straight
+from warpsplat.alpha import straight
 from warpsplat.fit.place import ShapeFactory, pixel_of, shape_angles
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary, filters
@@ -58,22 +58,19 @@ def new_shapes(
     settings: Settings,
     scene: Scene,
     target: FloatArray,
-    image: FloatArray,
+    error: FloatArray,
     count: int,
     rng: np.random.Generator,
-    weights: FloatArray | None = None,
 ) -> Scene:
     """Return ``count`` shapes on the components of the quantised error map, the largest error first.
 
     Where there are too few components, the others are placed at random, in proportion to the error.
 
-    ``scene`` has the canvas; the image ``target`` and the render ``image``, shape (height, width, 3 or 4),
-    may be smaller. ``weights``: of the pixels' errors, shape (height, width); default: all equal.
+    ``scene`` has the canvas; the image ``target``, shape (height, width, 3 or 4), may be smaller. ``error``:
+    see ``Objective.by_pixel``, shape (height, width).
     """
     unit = scene.canvas.width / target.shape[1]
-    total = squares(image - target)
-    weighted = total if weights is None else weights * total
-    error = np.asarray(filters.gaussian_blur(weighted, 1.0), np.float32)
+    error = np.asarray(filters.gaussian_blur(error, 1.0), np.float32)
     found = candidates(error, mixed=settings.mixed)
     chosen = _without_overlap(found, error.shape, count)
     places, radii = found.centres[chosen], np.maximum(RADIUS_RATIO * found.radii[chosen], 1.5)

@@ -122,6 +122,7 @@ class _Training:
         self, problem: Problem, run: Run, start: Start, rounding: Rounding | None, palette: Palette | None
     ) -> None:
         self.image, self.settings, self.run = problem.target, problem.settings, run
+        self.loss = problem.loss
         self.start, self.rounding, self.palette = start, rounding, palette
         self.plan = phases(self.settings, *problem.size)
         finest = Target(self.image, self.plan[-1]).image
@@ -144,7 +145,7 @@ class _Training:
         state = FitState.start(scene, self.run.backend, rng, begin, self.base, self.start.past)
         if self.run.deadline < math.inf:
             self.budget = Budget(self.run.deadline)
-            settings = self.budget.measure(state, settings, self.image)
+            settings = self.budget.measure(state, settings, self.image, self.loss)
         self.started = time.monotonic()
         step = Step(state, settings, self.target(settings, begin))
         self.step = densify(step, grows=True) if self.start.below is not None else step
@@ -152,7 +153,7 @@ class _Training:
 
     def target(self, settings: Settings, step: int) -> Target:
         """Return what the step after ``step`` steps is compared with."""
-        return Target(self.image, phase_at(settings, self.plan, step), self.weights)
+        return Target(self.image, phase_at(settings, self.plan, step), self.weights, self.loss)
 
     def is_over(self) -> bool:
         """Return whether there is no further step."""

@@ -43,7 +43,7 @@ def choose_paints(step: Step) -> None:
     min_gain = 0.0
     if settings.paint == "auto":
         size = len(export(scene, settings, min(USUAL_GRID, finest(settings))))
-        min_gain = GRADIENT_BYTES * byte_worth(step.square_error(), size)
+        min_gain = GRADIENT_BYTES * byte_worth(step.objective.value(), size)
     surplus = state.step > settings.density.thin * settings.iterations
     min_gain *= GAIN_TO_KEEP if surplus else GAIN_TO_TRY
     kind, ramps = _best_ramps(settings, solver, min_gain)

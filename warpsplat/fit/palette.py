@@ -111,9 +111,10 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
     """
     step.render()
     seen = step.renderer.visible()
-    weighted = step.weights()[seen.tile] * seen.share
+    near = step.objective.quadratic()
+    weighted = near.pixel_weights()[seen.tile] * seen.share
     squares = (weighted * seen.share).sum(axis=(1, 2), dtype=np.float64)
-    residual = step.residual()[seen.tile]
+    residual = near.residual()[seen.tile]
     residual *= weighted[:, None]
     pulls = residual.sum(axis=(2, 3))
     total = np.bincount(seen.shape, weights=squares, minlength=len(scene))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from warpsplat.fit.checkpoint import Checkpoint
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
@@ -29,6 +30,8 @@ class Problem:
     settings: Settings
     importance: FloatArray | None = None
     """How much the error of a pixel counts: grey mask in [0, 1], of any size."""
+    loss: CustomLoss | None = None
+    """Joins or replaces the squared error."""
     metadata: str = ""
     """Text for the file's metadata, which names the job."""
 

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from warpsplat.field_docs import described
 from warpsplat.scene import FloatArray, Scene
 
 if TYPE_CHECKING:
     from warpsplat.fit.state import Past
 
 
+@described
 @dataclass(frozen=True)
 class Snapshot:
     """The shapes of a run between two steps, read from the device when asked for."""
@@ -28,6 +30,7 @@ class Snapshot:
     """The optimizer's state, for a fit that continues from these shapes."""
 
 
+@described
 @dataclass(frozen=True)
 class Progress:
     """State of a run between two steps."""

@@ -92,8 +92,9 @@ class RampSolver:
         self._viewport = renderer.viewport
         self._visible = renderer.visible()
         self._gradient = np.isin(self.scene.paint, GRADIENTS)
-        self._residual = step.residual()
-        self._importance = step.weights()
+        near = step.objective.quadratic()
+        self._residual = near.residual()
+        self._importance = near.pixel_weights()
         boxes = bounds(self.scene).astype(np.float64)
         self._middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
         self._half = np.maximum(0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1), 0.5)

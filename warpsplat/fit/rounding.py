@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.fit.export import export, show
+from warpsplat.fit.export import export, shown_image
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
 from warpsplat.scene import OPACITY_RANGE, Basis, Paint, Scene
-from warpsplat.svg.viewer import on_white, premultiplied
 from warpsplat.svg.write import GRIDS, resized, rounded
 
 if TYPE_CHECKING:
@@ -78,13 +77,13 @@ def choose_grid(step: Step, *, staged: bool, rate_distortion: bool = False) -> f
     def error(scene: Scene) -> float:
         state.parameters.assign(scene)
         renderer.forward_complete()
-        return step.square_error()
+        return step.objective.value()
 
     scene = state.scene()
     before = error(scene)
     refitted = STAGED_COST if staged else 1.0
     decibels = MAX_TRADED_LOSS if rate_distortion else MAX_LOSS
-    allowed = before * float(elementary.power(10, decibels / 10) - 1) / refitted
+    allowed = abs(before) * float(elementary.power(10, decibels / 10) - 1) / refitted
     limit = finest(step.settings)
     grid, least, worth = limit, math.inf, 0.0
     if rate_distortion:
@@ -116,11 +115,11 @@ def freeze_opacities(step: Step) -> None:
     if step.settings.opaque:
         return
     step.renderer.forward_complete()
-    worth = np.maximum(step.removal_costs(), 0)
+    worth = np.maximum(step.objective.quadratic().removal_costs(), 0)
     scene = parameters.scene()
     cost = OPAQUE_COST * worth * ((1 - scene.opacities) / scene.opacities) ** 2
     size = len(export(scene, step.settings, min(USUAL_GRID, finest(step.settings))))
-    opaque = cost < OPACITY_BYTES * byte_worth(step.square_error(), size)
+    opaque = cost < OPACITY_BYTES * byte_worth(step.objective.value(), size)
     tenths = np.clip(np.round(scene.opacities, 1), 0.1, OPACITY_RANGE[1])
     opacities = np.where(opaque, OPACITY_RANGE[1], tenths)
     opacities = np.where(scene.paint == Paint.PICTURE, scene.opacities, opacities)
@@ -143,12 +142,12 @@ def freeze_stage(step: Step, stage: int) -> None:
     parameters.hold("widths", np.ones(len(scene), np.bool_))
 
 
-def byte_worth(square_error: float, size: int) -> float:
-    """Return by how much the mean squared error may grow for each byte saved of a file with ``size`` bytes.
+def byte_worth(loss: float, size: int) -> float:
+    """Return by how much the loss may grow for each byte saved of a file with ``size`` bytes.
 
     Shapes bought with that byte would lower the error as much: -d error / d size at ``DB_PER_DOUBLING``.
     """
-    return square_error * DB_PER_DOUBLING * elementary.LN10 / (10 * elementary.LN2 * size)
+    return abs(loss) * DB_PER_DOUBLING * elementary.LN10 / (10 * elementary.LN2 * size)
 
 
 def evaluate_file(step: Step) -> None:
@@ -162,6 +161,6 @@ def evaluate_file(step: Step) -> None:
     viewport, image = step.target.viewport, step.target.image
     scene = step.state.scene()
     text = export(scene, step.settings, step.state.per_pixel)
-    drawn = show(resized(text, viewport.width, viewport.height, viewport.scale), scene)
-    shown = (on_white(drawn) if image.shape[2] == 3 else premultiplied(drawn)) / 255
+    small = resized(text, viewport.width, viewport.height, viewport.scale)
+    shown = shown_image(small, scene, image.shape[2])
     step.loss_target.assign(np.asarray(image - (shown - step.renderer.read_image()), np.float32))

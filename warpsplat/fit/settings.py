@@ -14,6 +14,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
+from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     Option,
     nearest,
@@ -31,6 +32,10 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
+LossName = Literal["l2", "ssim", "edges"]
+
+LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 3.0}
+"""Weights of what joins the squared error."""
 
 PRESETS: dict[Quality, dict[str, Any]] = {
     "draft": {
@@ -145,6 +150,7 @@ class Density:
         check_fields(self, "density ")
 
 
+@described
 @dataclass(frozen=True)
 class Settings:
     """Everything but the image that decides the result. Fields without help are set by other options."""
@@ -201,6 +207,12 @@ class Settings:
         "flat",
         "A flat colour for each shape, a gradient, or whichever is worth its bytes.",
         subjects=FITTED,
+    )
+    loss: LossName = option(
+        "l2",
+        "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
+        subjects=FITTED,
+        refine=True,
     )
     levels: tuple[int, ...] = option(
         (),
@@ -266,6 +278,10 @@ class Settings:
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
+    strokes: bool = option(
+        False,
+        "Of drawings: what a round pen draws in even width becomes strokes; drafts have none.",
+    )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )
@@ -293,7 +309,9 @@ class Settings:
     softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
     gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
-    ssim: float = research(0.0, "Weight of 1 - SSIM: lowers PSNR and SSIMULACRA2.", WEIGHT)
+    loss_weight: float | None = research(
+        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 3 edges"
+    )
     texture: float = research(
         0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION
     )

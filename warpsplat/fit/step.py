@@ -9,8 +9,10 @@ import warp as wp
 
 from warpsplat.alpha import squares
 from warpsplat.fit import losses
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.importance import weights_at
 from warpsplat.fit.losses import LossInputs, LossTarget, level_programs
+from warpsplat.fit.objective import Objective
 from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.progress import Snapshot
 from warpsplat.fit.renderers import renderer_of
@@ -23,18 +25,25 @@ from warpsplat.rendering.forms import record_gather
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Capacity, Renderer
-from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import FloatArray
 
 
 class Target:
     """The image at the size of a phase, with weights of its pixels."""
 
-    def __init__(self, image: FloatArray, phase: Phase, weights: FloatArray | None = None) -> None:
+    def __init__(
+        self,
+        image: FloatArray,
+        phase: Phase,
+        weights: FloatArray | None = None,
+        loss: CustomLoss | None = None,
+    ) -> None:
         """Reduce an image (see ``Problem.target``) and weights to the phase's size, by area.
 
         ``weights``: of the pixels, shape (height, width) of any size and scale; default: all equal.
+        ``loss``: joins or replaces the squared error.
         """
+        self.loss = loss
         self.phase = phase
         height, width = image.shape[:2]
         size = (phase.width, phase.height)
@@ -83,7 +92,7 @@ class Step:
         self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
         levels = [state.parameters.prefix(end) for end in state.parameters.level_ends]
         self.level_renderers = [Renderer(level, target.viewport, model=model) for level in levels]
-        image = (target.image, self.renderer.backend, target.viewport, target.weights)
+        image = (target.image, self.renderer.backend, target.viewport, target.weights, target.loss)
         self.loss_target = loss_target or LossTarget(*image)
         self._level_target = LossTarget(*image) if levels else self.loss_target
         for renderer in self.renderers if capacity is None else self.level_renderers:
@@ -99,21 +108,24 @@ class Step:
         beside_forms = [backend.program("update")] if state.parameters.forms else []
         if state.parameters.curves:  # the outlines of forms are smooth by themselves
             for loss in losses.SHAPE_LOSSES:
-                loss.record(*beside_forms or [update], inputs)
+                loss.record(beside_forms[0] if beside_forms else update, inputs)
         for program in beside_forms:
             record_gather(program, state.parameters)  # with what the losses added
         record_adam(update, state.parameters, state.clock, self.settings)
+        compare = losses.image_program(inputs)
+        self.objective = Objective(inputs, compare)
+        """What judges shapes between steps."""
         target = self._level_target
         levels = [replace(inputs, renderer=renderer, target=target) for renderer in self.level_renderers]
         self.programs: tuple[Program, ...] = (
             self.renderer.forward_program,  # render
-            losses.image_program(inputs),  # compare
+            compare,
             self.renderer.backward_program,  # back-propagate
             *beside_forms,
             *(program for level in levels for program in level_programs(level, state.parameters)),
             update,
         )
-        self._graph = capture(backend.device, self.programs)
+        self._graph = None if self.target.loss else capture(backend.device, self.programs)
 
     def advance(self) -> None:
         """Do the step. Nothing is allocated or read back."""
@@ -164,37 +176,10 @@ class Step:
             loss_target=self.loss_target,
         )
 
-    def removal_costs(self) -> FloatArray:
-        """Return by how much the last render's squared error grows without each shape, shape (shape,)."""
-        return self.renderer.removal_costs(self.loss_target.target, self.loss_target.importance)
-
-    def square_error(self) -> float:
-        """Return the mean squared error of the last render against the loss target. Reads the render back."""
-        film = self.renderer.film.buffers
-        difference = read_tiles(film.image) - read_tiles(self.loss_target.target)
-        errors = squares(difference, axis=1) * read_tiles(film.inside)
-        return float(errors.sum(dtype="float64")) / self.loss_target.value_count
-
     def measured_error(self) -> float:
-        """Return ``square_error`` as summed on the device. Reads a number per tile back."""
+        """Return the mean squared error of the last render. Reads a number per tile back."""
         self.programs[1].run()
         return self.loss_target.mean_square()
-
-    def residual(self) -> FloatArray:
-        """Return loss target - last render, by colour, shape (tile, 3, TILE, TILE).
-
-        On a transparent canvas, the mean of the residuals on black and on white. Copies both to the host.
-        """
-        residual = read_tiles(self.loss_target.target) - read_tiles(self.renderer.film.buffers.image)
-        if residual.shape[1] == 4:
-            residual = residual[:, :3] - 0.5 * residual[:, 3:]
-        return np.asarray(residual, np.float32)
-
-    def weights(self) -> FloatArray:
-        """Return the weight of each pixel's error, 0 outside the image, shape (tile, TILE, TILE)."""
-        target = self.loss_target
-        weights = target.importance if target.weighted else self.renderer.film.buffers.inside
-        return read_tiles(weights)
 
     def psnr(self) -> float:
         """Return the PSNR of the last step's loss, at its size [dB]: that of the render, or once the file has

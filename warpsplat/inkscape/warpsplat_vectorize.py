@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 COMMAND = ["warpsplat"]
-"""What starts warpsplat; set by ``warpsplat inkscape``."""
+"""Arguments that start warpsplat; set by ``warpsplat inkscape``."""
 
 FOLDER = "."
 """Where it is started: the folder that has the package; set by ``warpsplat inkscape``."""
@@ -57,6 +57,7 @@ def main() -> None:
     parser.add_argument("--colors", type=int, default=0)
     parser.add_argument("--detail", type=float, default=0.5)
     parser.add_argument("--subject", default="auto")
+    parser.add_argument("--strokes", default="false")
     given = parser.parse_known_args()[0]
     root = read(given.document)
     chosen = [element for element in root.iter() if element.get("id") in given.id]
@@ -65,6 +66,7 @@ def main() -> None:
         sys.exit("Select a bitmap first.")
     options = [f"--subject={given.subject}", f"--detail={given.detail}"]
     options += [f"--colors={given.colors}"] if given.colors else []
+    options += ["--strokes"] if given.strokes == "true" else []
     options += [f"--time-budget={given.time_budget}s"] if given.time_budget else []
     limit = given.time_budget + GRACE if given.time_budget else None
     parents = {child: parent for parent in root.iter() for child in parent}

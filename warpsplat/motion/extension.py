@@ -1,7 +1,8 @@
-"""Declare animations and terminal previews."""
+"""Declare animations, and previews in terminals and notebooks."""
 
 from warpsplat.extensions import Extension
 
 EXTENSION = Extension(
-    run_hooks=("warpsplat.motion.hook:MotionHook",), api={"Recorder": "warpsplat.motion.recorder"}
+    run_hooks=("warpsplat.motion.hook:MotionHook",),
+    api={"Recorder": "warpsplat.motion.recorder", "Live": "warpsplat.motion.notebook"},
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -14,14 +14,15 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
+from warpsplat.pydiffvg.gather import FIRST, Place, places_of
 from warpsplat.pydiffvg.shape import Circle, Ellipse, Path, Polygon, Rect, Shape, ShapeGroup
 from warpsplat.scene import Paint
 from warpsplat.svg.shapes import LineStyle
 
 Tensor = torch.Tensor
 
-ZERO, ONE, FIRST = 0, 1, 2
-"""Indices of a scene's numbers: the constants 0 and 1, then the values of its tensors one after the other."""
+ZERO, ONE = 0, 1
+"""Indices of a scene's numbers: the constants 0 and 1; from FIRST on come the values of its tensors."""
 
 IDENTITY = np.eye(3).tolist()
 
@@ -100,6 +101,11 @@ class SceneArguments:
     tensors: tuple[Tensor, ...]
     """For each shape its coordinates and width, then for each group its fill, stroke and transform."""
 
+    @functools.cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Where the tensors' values lie among the scene's numbers."""
+        return places_of(self.tensors)
+
 
 def serialize(
     width: int, height: int, shapes: Sequence[Shape], groups: Sequence[ShapeGroup], device: torch.device
@@ -113,7 +119,7 @@ def serialize(
     widths = [id(shape.stroke_width) for shape in shapes]
     structures = []
     for number, group in enumerate(groups):
-        name, ids = f"group {number}", [int(i) for i in group.shape_ids.tolist()]
+        name, ids = f"group {number}", _list(group.shape_ids)
         for i in ids:
             if not 0 <= i < len(shapes):
                 raise UsageError(f"{name} names shape {i}, there are {len(shapes)}")
@@ -146,10 +152,20 @@ class _Tensors:
         at, self._next = self._next, self._next + value.numel()
         return at
 
+    def add_widths(self, value: Tensor, points: int, name: str) -> int:
+        """Collect a tensor with a number for each point, and maybe more."""
+        surplus = isinstance(value, Tensor) and value.dim() == 1 and len(value) > points
+        return self.add(value, (-1,) if surplus else (points,), name)
+
     def add_number(self, value: Tensor, name: str) -> int:
         """Collect a tensor that holds one number, in any shape."""
         is_number = isinstance(value, Tensor) and value.numel() == 1
         return self.add(value, tuple(value.shape) if is_number else (), name)
+
+
+def _list(values: Tensor | Sequence[int]) -> list[int]:
+    """Return whole numbers, which programs give as a tensor, an array or a list."""
+    return [int(i) for i in (values.tolist() if hasattr(values, "tolist") else values)]
 
 
 def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
@@ -173,7 +189,7 @@ def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
     points = sum(counts) + len(counts) + (not closed)
     width, name = shape.stroke_width, f"stroke_width of {name}"
     tapers = isinstance(width, Tensor) and width.numel() != 1
-    at = tensors.add(width, (points,), name) if tapers else tensors.add_number(width, name)
+    at = tensors.add_widths(width, points, name) if tapers else tensors.add_number(width, name)
     return ShapeStructure(kind, counts, closed, points, tapers, first, at)
 
 
@@ -183,9 +199,9 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
     if isinstance(shape, Polygon):
         counts = (0,) * (points - is_open)
     else:
-        counts = tuple(map(int, shape.num_control_points.tolist()))
+        counts = tuple(_list(shape.num_control_points))
     wanted = sum(counts) + len(counts) + is_open
-    if not counts or not {0, 1, 2}.issuperset(counts) or wanted != points:
+    if not counts or not {0, 1, 2}.issuperset(counts) or wanted > points:
         raise UsageError(
             f"{name} has {points} points, its num_control_points {list(counts)} ask for {wanted}"
         )
@@ -211,7 +227,7 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     if color is None:
         return None
     if isinstance(color, Tensor):
-        return PaintStructure(Paint.FLAT, 0, tensors.add(color, (4,), name))
+        return PaintStructure(Paint.FLAT, 0, tensors.add(color, (4, 1) if color.dim() == 2 else (4,), name))
     if isinstance(color, LinearGradient):
         kind, points = Paint.LINEAR, {"begin": color.begin, "end": color.end}
     elif isinstance(color, RadialGradient):
@@ -235,23 +251,39 @@ def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[obje
     return owners + fields + list(chain.from_iterable(vars(each).values() for each in gradients))
 
 
-def _numbers(objects: list[object]) -> list[object]:
-    """Return sizes of tensors, and numbers that belong to the structure.
+def _numbers(
+    shapes: Sequence[Shape], groups: Sequence[ShapeGroup], tensors: Sequence[Tensor]
+) -> Iterator[object]:
+    """Yield sizes of tensors, and numbers that belong to the structure.
 
-    They are compared by value, as code can write into tensors without leaving a trace.
+    They are compared by value, as code can write into tensors without leaving a trace; and one by one, as
+    thousands of new objects at a time would have Python look for cycles.
     """
-    found: list[object] = [each.shape for each in objects if isinstance(each, torch.Tensor)]
-    for each in objects:
-        if isinstance(each, Path):
-            found.append(each.num_control_points.tolist())
-        elif isinstance(each, ShapeGroup):
-            matrix = each.shape_to_canvas
-            found += each.shape_ids.tolist(), matrix.tolist(), matrix.requires_grad
-    return found
+    for tensor in tensors:
+        yield tensor.shape
+    for shape in shapes:
+        if isinstance(shape, Path):
+            yield _list(shape.num_control_points)
+    for group in groups:
+        matrix = group.shape_to_canvas
+        yield _list(group.shape_ids)
+        yield matrix.tolist()
+        yield matrix.requires_grad
 
 
-_last: tuple[list[object], list[object], SceneArguments] | None = None
-"""Objects, numbers and the scene that was made of them."""
+class _Cached(NamedTuple):
+    """A scene and what it was made of."""
+
+    frame: tuple[object, ...]
+    """Size, device and number of shapes."""
+    objects: list[object]
+    tensors: list[Tensor]
+    """Those of the objects."""
+    numbers: list[object]
+    scene: SceneArguments
+
+
+_last: _Cached | None = None
 
 
 def serialize_cached(
@@ -259,16 +291,22 @@ def serialize_cached(
 ) -> SceneArguments:
     """Return ``serialize`` of the arguments, or the last result where only values in tensors have changed."""
     global _last  # noqa: PLW0603 - one scene is kept, with its tensors, until the next
-    objects = _objects(shapes, groups)
-    numbers = [int(width), int(height), device, len(shapes), *_numbers(objects)]
-    if last := _last:  # another thread may replace it meanwhile
-        before, before_numbers, scene = last
-        same = len(objects) == len(before) and all(map(operator.is_, objects, before))
-        if same and numbers == before_numbers:
-            return scene
+    frame, objects = (int(width), int(height), device, len(shapes)), _objects(shapes, groups)
+    last = _last  # another thread may replace it meanwhile
+    if (
+        last
+        and frame == last.frame
+        and len(objects) == len(last.objects)
+        and all(map(operator.is_, objects, last.objects))
+        and all(map(operator.eq, _numbers(shapes, groups, last.tensors), last.numbers))
+    ):
+        return last.scene
     scene = serialize(width, height, shapes, groups, device)
     own = set(map(id, objects))
     # Copies and results of operations are made again for each scene.
-    is_reusable = all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors)
-    _last = (objects, numbers, scene) if is_reusable else None
+    if all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors):
+        tensors = [each for each in objects if isinstance(each, Tensor)]
+        _last = _Cached(frame, objects, tensors, list(_numbers(shapes, groups, tensors)), scene)
+    else:
+        _last = None
     return scene

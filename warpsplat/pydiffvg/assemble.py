@@ -20,7 +20,7 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     """Return the attributes of ``layout.scene`` by name, in pixels of the image."""
     canvas = layout.scene.canvas
     scale = canvas.width / scene.width, canvas.height / scene.height
-    numbers: Tensor = Concatenate.apply(*scene.tensors)
+    numbers: Tensor = Concatenate.apply(scene.places, *scene.tensors)
     points = layout.points(numbers)
     if layout.order is not None:
         points = torch.cat([points, *(area.points(numbers) for area in layout.areas)])

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class FilterType(IntEnum):
-    """Kinds of pixel filters; only ``box`` can be rendered."""
+    """Kinds of pixel filters."""
 
     box = 0
     tent = 1

@@ -65,9 +65,9 @@ class Row(NamedTuple):
         return [self.kind == Kind.FILL or shape.closed for shape in self.shapes]
 
     def outlines(self) -> list[Terms]:
-        """Return the control points of each contour, see ``_coordinates``; none of an area."""
+        """Return the control points of each contour, see ``coordinates``; none of an area."""
         each = [] if self.is_area else zip(self.shapes, self.closed(), strict=True)
-        return [_coordinates(shape, _contour(shape, is_closed)) for shape, is_closed in each]
+        return [coordinates(shape, _contour(shape, is_closed)) for shape, is_closed in each]
 
 
 class Area(NamedTuple):
@@ -203,7 +203,7 @@ def _rows(structure: Structure, uniform: bool) -> list[Row]:
 
 
 @functools.lru_cache(maxsize=1024)
-def _segments(counts: tuple[int, ...], points: int) -> Terms:
+def segments(counts: tuple[int, ...], points: int) -> Terms:
     """Return the control points of segments as cubics, as sums of a shape's points, shape (segment, 4, 2).
 
     ``counts``: see ``ShapeStructure``; a closed shape's last segment ends at the first of its ``points``.
@@ -215,13 +215,13 @@ def _segments(counts: tuple[int, ...], points: int) -> Terms:
 
 def _contour(shape: ShapeStructure, is_closed: bool) -> Terms:
     """Return the control points of a contour as sums of the shape's points, shape (point, 2)."""
-    terms = _segments(shape.counts + (0,) * (is_closed and not shape.closed), shape.points)
+    terms = segments(shape.counts + (0,) * (is_closed and not shape.closed), shape.points)
     kept = np.arange(4 * len(terms.indices)) % 4 < 3  # a segment's end is the next one's start
     kept[-1] = not is_closed
     return terms.map(lambda each: each.reshape(-1, 2)[kept])
 
 
-def _coordinates(shape: ShapeStructure, points: Terms) -> Terms:
+def coordinates(shape: ShapeStructure, points: Terms) -> Terms:
     """Return the coordinates of points as sums of the scene's numbers, shape (..., coordinate, term).
 
     ``points``: the points as sums of the shape's, shape (..., term).
@@ -261,12 +261,12 @@ def _areas(rows: list[Row], scene: Scene, device: torch.device) -> tuple[tuple[A
 
 def _area(shapes: list[ShapeStructure], is_closed: bool, device: torch.device) -> Area:
     """Return strokes of equally many segments, all closed or all open."""
-    pairs = [(shape, _segments(shape.counts, shape.points)) for shape in shapes]
-    points = [_coordinates(shape, line) for shape, line in pairs]
+    pairs = [(shape, segments(shape.counts, shape.points)) for shape in shapes]
+    points = [coordinates(shape, line) for shape, line in pairs]
     # A stroke of one width has it at each point.
     radii = [Terms(shape.width + line.indices * shape.tapers, line.weights) for shape, line in pairs]
-    segments, widths = (Gather(combined(each, np.stack), device) for each in (points, radii))
-    return Area(segments, widths, is_closed)
+    lines, widths = (Gather(combined(each, np.stack), device) for each in (points, radii))
+    return Area(lines, widths, is_closed)
 
 
 def _transforms(

@@ -141,6 +141,8 @@ class OptimizableSvg:
         if verbose:
             shapes = sum(bool(element.paths) for element in elements)
             print(f"{path}: {len(elements)} elements, {shapes} of them shapes")
+        self.scene: tuple[int, int, list[Shape], list[ShapeGroup]] | None = None
+        """What ``build_scene`` last returned."""
         self.background = torch.ones(3, device=self.device)
         """sRGB, shape (3,)."""
         self._optimizers = [optimizer for element in elements for optimizer in element.optimizers]
@@ -153,7 +155,8 @@ class OptimizableSvg:
         shapes: list[Shape] = []
         groups: list[ShapeGroup] = []
         self.root.build(self._view.to(self.device), torch.ones(1, device=self.device), shapes, groups)
-        return self.canvas[0], self.canvas[1], shapes, groups
+        self.scene = self.canvas[0], self.canvas[1], shapes, groups
+        return self.scene
 
     def render(self, scale: float | None = None, seed: int = 0) -> Tensor:
         """Render the document, magnified by ``scale``; see ``RenderFunction.apply``."""

@@ -72,7 +72,8 @@ class Backend:
     """CPU threads that share a launch; 1 on a GPU."""
     lanes: int
     """Threads a tile, 1 or GPU_LANES: a CPU keeps a tile in one thread's cache; a GPU's threads have a vector
-    of QUAD pixels each, so that they need few registers and neighbours read neighbouring memory."""
+    of QUAD pixels each, so that they need few registers and neighbours read neighbouring memory. Divisors of
+    GPU_LANES, from 4 on, work as well."""
 
     @staticmethod
     def on(device: wp.Device | str | None = None, threads: int | None = None) -> Backend:
@@ -133,14 +134,14 @@ class Backend:
         """Return sums over the lanes, the last dimension, on the host. They are summed up where they are: a
         GPU has so many that copying them would take longer.
         """
-        shape = by_lane.shape[:-1]
+        *shape, lane_count = by_lane.shape
         sums = by_lane
-        if self.lanes > 1:
+        if lane_count > 1:
             count = math.prod(shape)
             sums = self.array(wp.float32, count)
             program = self.program()
             program.launch(
-                lanes.lane_sums, count, by_lane=view(by_lane, wp.float32, (count, self.lanes)), sums=sums
+                lanes.lane_sums, count, by_lane=view(by_lane, wp.float32, (count, lane_count)), sums=sums
             )
             program.run()
         return np.asarray(sums.numpy()).reshape(shape)

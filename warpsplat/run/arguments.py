@@ -10,6 +10,7 @@ from inspect import Parameter
 from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
 from warpsplat.errors import UsageError, shown
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.options import nearest
 from warpsplat.fit.settings import Settings
 from warpsplat.run.options import settings_from
@@ -60,14 +61,22 @@ def settings_given(function: Callable[..., Any], settings: Settings | None, **op
     return settings
 
 
+def custom_loss(options: Mapping[str, Any]) -> tuple[CustomLoss | None, dict[str, Any]]:
+    """Return the loss among options if it is a function, and the other options."""
+    given = options.get("loss")
+    if not callable(given) and not isinstance(given, CustomLoss):
+        return None, {**options}
+    made = given if isinstance(given, CustomLoss) else CustomLoss(given)
+    return made, {**options, "loss": None}
+
+
 @contextmanager
 def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backend]]:
     """Yield a function that starts the device, which is then held, and returns its backend.
 
     Raises ``UsageError`` at once for an unknown device.
     """
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")
+    check_threads(threads)
     with ExitStack() as held:
 
         @functools.cache
@@ -84,3 +93,9 @@ def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backen
         if device not in ALWAYS_THERE:
             started()
         yield started
+
+
+def check_threads(threads: int | None) -> None:
+    """Raise ``UsageError`` unless a number of threads is a whole number from 1, or None."""
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise UsageError(f"threads must be a whole number from 1, not {shown(threads)}")

@@ -143,6 +143,7 @@ def identity(command: str, settings: Settings, problem: Problem, svg: str | None
         "image": _digest(problem.target),
         "mask": "" if mask is None else _digest(mask),
         "svg": "" if svg is None else hashlib.sha256(svg.encode()).hexdigest(),
+        "loss": problem.loss.name if problem.loss else "",
         "settings": json.loads(json.dumps(asdict(settings))),
     }
 

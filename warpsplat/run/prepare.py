@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.errors import UsageError
 from warpsplat.files.image import boxed
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, make_settings, solid_color
@@ -42,6 +44,7 @@ def prepare(
     *,
     name: str | None = None,
     importance: ImageSource | None = None,
+    loss: CustomLoss | None = None,
     keyed: bool = False,
 ) -> PreparedImage:
     """Read an image and its mask, at a size that memory allows, and find out what it shows.
@@ -71,7 +74,9 @@ def prepare(
         target = boxed(target, factor // first)
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor)
-    prepared = PreparedImage(Problem(target, chosen, metadata=key), why, reduction, name)
+    if loss and chosen.subject != "photo":
+        raise UsageError(f"subject {chosen.subject} and a loss of your own do not go together")
+    prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, reduction, name)
     if importance is None:
         return prepared
     mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1

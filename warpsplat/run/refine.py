@@ -17,12 +17,13 @@ from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import show
 from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.objective import loss_of_file
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
-from warpsplat.run.arguments import backend_on, check_keywords, takes
+from warpsplat.run.arguments import backend_on, check_keywords, custom_loss, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
 from warpsplat.run.formats import write_named
@@ -88,12 +89,13 @@ def refine(
             ``vectorize``; an SVG that cannot be read, or held, is an ``ImageError``.
     """
     check_keywords(refine, options)
-    settings = settings or make_settings(iterations=iterations, max_memory=max_memory, **options)
+    loss, given = custom_loss(options)
+    settings = settings or make_settings(iterations=iterations, max_memory=max_memory, **given)
     name = name or svg_name_of(svg)
     text, image_name = text_of(svg, name), source_name(image)
     pixels = held(image)
     check_refined(pixels, settings, image_name)
-    problem = Problem(load_target(pixels, image_name, settings.background), settings)
+    problem = Problem(load_target(pixels, image_name, settings.background), settings, loss=loss)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
         saved = kept.open(identity("refine", settings, problem, text), backend()) if kept else None
@@ -107,7 +109,7 @@ def refine(
 
 
 def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool = False) -> Result:
-    """Improve an SVG's text; a result that is no better is the SVG unchanged.
+    """Improve an SVG's text; a result that is no better, by PSNR or another loss, is the SVG unchanged.
 
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
@@ -122,7 +124,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     scene = base.scene
     before = score_svg(text, target, perceptual=False)
     settings = _settings(problem.settings, len(scene))
-    made = fit(Problem(target, settings), run, Start(scene=scene))
+    problem = replace(problem, target=target, settings=settings)
+    made = fit(problem, run, Start(scene=scene))
     if checkpoint and made.interrupted:
         checkpoint.save()
     release_memory()
@@ -136,6 +139,9 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     perceptual = has_time_for_ssimulacra2(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, perceptual=perceptual)
     better = score.psnr > before.psnr
+    if problem.loss or settings.loss != "l2":
+        after, start = (loss_of_file(each, refined, problem, run.backend) for each in (svg, text))
+        better = after < start
     if perceptual and not better:
         before = score_svg(text, target)
     if view:
@@ -168,7 +174,7 @@ def _settings(settings: Settings, count: int) -> Settings:
         density=Density(interval=0),
         rates={**settings.rates, "points": REFINE_RATE},
         renderer="exact",
-        texture=0.0,  # the PSNR decides whether a result is better
+        texture=0.0,  # the unweighted loss decides whether a result is better
     )
 
 

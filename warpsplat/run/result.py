@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat._version import __version__
+from warpsplat.field_docs import described
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.metrics import Score
@@ -24,34 +25,39 @@ STOPPED = "stopped"
 """Key of a result that was cut short."""
 
 
+@described
 @dataclass(frozen=True)
 class LevelScore:
     """PSNR of a layered file without the layers above a level."""
 
     shapes: int
+    """Shapes of this level and those below."""
     psnr: float | None
     """As a viewer shows it [dB]; None if it equals the image."""
 
 
-@dataclass(frozen=True)
+@described
+@dataclass(frozen=True, repr=False)
 class Result:
-    """The result of a run."""
+    """The result of a run. Results are equal if their files are, and how they came about, times aside."""
 
     svg: str
+    """The text of the file."""
     scene: Scene
     """The shapes of the file; with soft Gaussians the trained ones, which a file cannot show as they are."""
     score: Score | None
     """Score of the SVG as resvg shows it; None if the run was stopped before that."""
-    render_psnr: float
+    render_psnr: float = field(compare=False)
     """PSNR of the last training render against the image, at its size [dB]; NaN: a draft of a drawing is
     not rendered. With soft Gaussians, if the image is no larger than that size: of the finished scene in 8
     bits, like the file's.
     """
-    estimated_psnr: float
+    estimated_psnr: float = field(compare=False)
     """PSNR of the file at that size, as estimated by the training [dB]; NaN likewise."""
     iterations: int
     """Steps done; fewer than asked for when stopped."""
-    seconds: float
+    seconds: float = field(compare=False)
+    """Time that it took."""
     stopped: bool
     """Whether the run was interrupted."""
     renderer: str = "exact"
@@ -66,7 +72,7 @@ class Result:
     """The subject that the image was taken for."""
     why: str = ""
     """The reason for the subject; empty if it was given."""
-    history: tuple[Progress, ...] = field(default=(), repr=False)
+    history: tuple[Progress, ...] = field(default=(), compare=False)
     """The progress reports of the training, in order."""
     before: float | None = None
     """PSNR of an SVG before it was refined [dB]."""
@@ -88,6 +94,25 @@ class Result:
             OutputError: it cannot be written.
         """
         write_named(Path(path), self.svg)
+
+    def __repr__(self) -> str:
+        return f"Result({self._summary()})"
+
+    def _summary(self) -> str:
+        """Return the figures in one line."""
+        quality = "not measured" if self.score is None else f"{self.score.psnr:.2f} dB"
+        parts = [f"{len(self.scene)} shapes", quality, f"{len(self.svg.encode()):,d} bytes", self.subject]
+        return ", ".join([*parts, f"{self.seconds:.1f} s", *(["stopped"] if self.stopped else [])])
+
+    def _repr_svg_(self) -> str:
+        """Return what notebooks show."""
+        return self.svg
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: the picture, which as an image runs no scripts, and its figures."""
+        source = base64.b64encode(self.svg.encode()).decode()
+        picture = f'<img src="data:image/svg+xml;base64,{source}" alt="" style="max-width: 100%">'
+        return f"<figure>{picture}<figcaption>{self._summary()}</figcaption></figure>"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures for JSON; those that were not measured are None."""

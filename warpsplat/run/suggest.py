@@ -11,6 +11,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
+from warpsplat.field_docs import described
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
@@ -50,17 +51,20 @@ ROUNDING_SHARE = 0.05
 """Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
 
 SIMPLER = ", and --detail how small they may be"
-"""What else can be chosen for a drawing."""
+"""Ending of a suggestion for a drawing."""
 
 
+@described
 @dataclass(frozen=True)
 class Expected:
     """Expected quality and size of a number of shapes."""
 
     shapes: int
+    """Their number."""
     psnr: float
-    """[dB]"""
+    """Of the file as a viewer shows it [dB]."""
     bytes: int
+    """Size of the file."""
 
     def __str__(self) -> str:
         """Return the beginning of a sentence."""
@@ -68,6 +72,7 @@ class Expected:
         return f"{self.shapes} shapes are expected to give {self.psnr:.1f} dB in {size}"
 
 
+@described
 @dataclass(frozen=True)
 class Suggestion:
     """A suggested number of shapes, and the reason."""
@@ -85,6 +90,7 @@ class Suggestion:
     by_bytes: int | None
     """Most shapes of which 10 kB more gain what can be seen."""
     seconds: float
+    """Time that the search took."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values for JSON."""

@@ -8,18 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from warpsplat.errors import ImageError, naming
-from warpsplat.files.sources import ImageSource, Readable, image_of, source_bytes, source_name
+from warpsplat.files.sources import BytesLike, ImageSource, Readable, image_of, source_bytes, source_name
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import Score, score_svg
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
+from warpsplat.scene.scene import check_scene
 from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
 from warpsplat.svg.read import load_kept
 from warpsplat.svg.write import minified
 
-SvgSource = str | os.PathLike[str] | bytes | Readable
+SvgSource = str | os.PathLike[str] | BytesLike | Readable
 """An SVG: its text (a string with a ``<`` in it), its file's path, its bytes, or a file open for reading;
 gzipped or not."""
 
@@ -65,7 +66,9 @@ def save_svg(
     Raises:
         UsageError: a value out of range.
         OutputError: ``path`` cannot be written.
+        TypeError: not a scene.
     """
+    check_scene(scene)
     settings = make_settings(precision=precision, title=title, ids=ids)
     text = export(scene, settings, finest(settings))
     text = minified(text) if minify else text
@@ -74,14 +77,16 @@ def save_svg(
     return text
 
 
-def score(svg: SvgSource, image: ImageSource) -> Score:
+def score(svg: SvgSource | Scene, image: ImageSource) -> Score:
     """Measure how well an SVG shows an image, as a viewer draws it at the image's size, and count its parts.
 
+    Of a scene it is the SVG that ``save_svg`` writes.
     If the image has opacity, it is measured on black and on white, and the lower figures count.
 
     Raises:
         ImageError: either cannot be read, or their proportions differ.
     """
+    svg = save_svg(svg) if isinstance(svg, Scene) else svg
     name = svg_name_of(svg)
     target, text = image_of(image), text_of(svg, name)
     with naming(name):
@@ -100,7 +105,7 @@ def text_of(svg: SvgSource, name: str) -> str:
         return svg
     if isinstance(svg, (str, bytes)) and not svg.strip():
         raise ImageError(f"{name}: is empty: give an SVG's text, its bytes, or the path of its file")
-    if not isinstance(svg, (str, os.PathLike, bytes, bytearray, memoryview, Readable)):
+    if not isinstance(svg, (str, os.PathLike, BytesLike, Readable)):
         raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
     return svg_text(source_bytes(svg, "an SVG"), name)
 

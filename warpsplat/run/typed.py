@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypedDict
 
-from warpsplat.fit.settings import Painting, Quality, Subject
+from warpsplat.fit.custom_loss import CustomLoss, LossFunction
+from warpsplat.fit.settings import LossName, Painting, Quality, Subject
 
 
 class RefineOptions(TypedDict, total=False):
     """Options that ``refine`` shares with ``vectorize``. One that is None counts as not given."""
 
+    loss: LossName | LossFunction | CustomLoss | None
     time_budget: float | str | None
     background: str | None
     title: str | None
@@ -48,3 +50,4 @@ class Options(RefineOptions, total=False):
     page: str | None
     units: str | None
     symbols: bool | None
+    strokes: bool | None

@@ -6,6 +6,7 @@ import functools
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
-from warpsplat.run.arguments import backend_on, settings_given, takes
+from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
@@ -81,7 +82,8 @@ def vectorize(
         resume: continue from the checkpoint, to the bytes of an uninterrupted run; without one, start.
         checkpoint_every: seconds, or ``"2m"``.
         overwrite: let a run that starts from the beginning replace a checkpoint, or any other file, there.
-        options: see ``Options`` and the documentation's table.
+        options: see ``Options`` and the documentation's table. ``loss`` may be a function of the render, see
+            ``LossFunction``, which then replaces the squared error; ``CustomLoss`` lets it join that.
 
     Returns:
         the SVG, its scene, its score and the run's history.
@@ -96,12 +98,15 @@ def vectorize(
     """
     if isinstance(curves, (list, tuple)):
         raise UsageError(f"several numbers of shapes: vectorize_several(image, {list(curves)})")
-    settings = settings_given(vectorize, settings, curves=curves, **options)
+    loss, given = custom_loss(options)
+    settings = settings_given(vectorize, settings, curves=curves, **given)
+    if loss and settings.subject == "auto":
+        settings = replace(settings, subject="photo")
     given_files = (image, importance, output)
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
     write = None if output is None else functools.partial(write_named, Path(output))
     with backend_on(device, threads) as backend:
-        prepared = prepare(image, settings, name=name, importance=importance, keyed=keyed)
+        prepared = prepare(image, settings, name=name, importance=importance, loss=loss, keyed=keyed)
         saved = kept.open(identity("vectorize", settings, prepared.problem), backend()) if kept else None
         result = make_result(prepared, Run(backend, callback, stop, checkpoint=saved), write)
     if kept and not result.stopped:

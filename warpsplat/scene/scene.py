@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.field_docs import described
 from warpsplat.forms import form_of
 from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
 
@@ -17,7 +18,8 @@ IndexArray = npt.NDArray[np.intp]
 IntArray = npt.NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@described
+@dataclass(frozen=True, eq=False)
 class Canvas:
     """The canvas that the shapes lie on."""
 
@@ -30,12 +32,25 @@ class Canvas:
     crisp: bool = False
     """Whether viewers should draw edges without antialiasing, because cells abut."""
 
+    def __post_init__(self) -> None:
+        """Raise a ``ValueError`` for a canvas without a pixel."""
+        if not (self.width >= 1 and self.height >= 1):
+            raise ValueError(f"a canvas of {self.width}x{self.height} px has no pixel")
 
+    def __eq__(self, other: object) -> bool:
+        return _equal(self, other) if isinstance(other, Canvas) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self.width, self.height))
+
+
+@described
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """SVG elements that no shape can hold, and their rendering."""
+    """SVG elements that no shape can hold, and their rendering. It equals only itself."""
 
     markup: str
+    """The elements."""
     size: tuple[float, float]
     """Size of the canvas in the markup's units."""
     corner: tuple[int, int]
@@ -58,7 +73,8 @@ class Alike(NamedTuple):
     """Shape (contour, point, 2)."""
 
 
-@dataclass(frozen=True)
+@described
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """Bézier shapes on a canvas; row 0 is painted first (furthest back).
 
@@ -71,11 +87,14 @@ class Scene:
 
     Below, "shape (shape, 3)" is an array with a row for each shape and three columns.
 
+    Scenes are equal if all their values are.
+
     Only ``canvas``, ``kind``, ``first`` and ``points`` must be given. By default, shapes are cubics of one
     contour, closed in fills and open in strokes, traits have their defaults, and attributes are 0.
     """
 
     canvas: Canvas
+    """What the shapes lie on."""
     kind: IntArray
     """``Kind`` of each shape, shape (shape,)."""
     first: IntArray
@@ -200,6 +219,17 @@ class Scene:
     def __len__(self) -> int:
         return len(self.kind)
 
+    def __eq__(self, other: object) -> bool:
+        return _equal(self, other) if isinstance(other, Scene) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self.canvas, len(self), len(self.points)))  # values may change in place, sizes cannot
+
+    def __repr__(self) -> str:
+        strokes = int((self.kind == Kind.STROKE).sum())
+        parts = f"{len(self)} shapes, {strokes} of them strokes, {len(self.points)} points"
+        return f"Scene({self.canvas.width}x{self.canvas.height} px, {parts})"
+
     @staticmethod
     def uniform(
         kind: Kind,
@@ -287,9 +317,11 @@ class Scene:
     def alike(self) -> Iterator[Alike]:
         """Yield contours grouped by kind, basis, closedness and number of points."""
         owner, counts = self.contour_shapes(), np.diff(self.starts)
-        keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts], axis=1)
-        for kind, basis, closed, count in sorted(set(map(tuple, keys.tolist()))):
-            index = np.flatnonzero((keys == (kind, basis, closed, count)).all(axis=1))
+        keys = np.stack([self.kind[owner], self.basis[owner], self.closed, counts])
+        order = np.lexsort(keys[::-1])
+        ends = np.flatnonzero((np.diff(keys[:, order]) != 0).any(axis=0)) + 1
+        for index in np.split(order, ends) if len(order) else ():
+            kind, basis, closed, count = keys[:, index[0]].tolist()
             points = self.points[self.starts[index][:, None] + np.arange(count)]
             yield Alike(Kind(kind), Basis(basis), bool(closed), owner[index], index, points)
 
@@ -349,6 +381,24 @@ class Scene:
         """Return the shapes with only the points ``keep``, shape (point,)."""
         left = np.concatenate([[0], np.cumsum(keep)]).astype(np.int32)
         return replace(self, first=left[self.first], starts=left[self.starts], points=self.points[keep])
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Return whether all fields of two instances of a dataclass are equal; of arrays, the values."""
+    pairs = ((getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    return all(
+        np.array_equal(a, b) if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) else a == b
+        for a, b in pairs
+    )
+
+
+def check_scene(scene: object) -> None:
+    """Raise a ``TypeError`` unless ``scene`` is a ``Scene``."""
+    if isinstance(scene, Scene):
+        return
+    found = type(scene).__name__
+    more = {"SceneTensors": ": give its scene()", "str": ": warpsplat.load_svg reads one from a file or text"}
+    raise TypeError(f"a Scene is needed, not {found}{more.get(found, '')}")
 
 
 def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> IndexArray:

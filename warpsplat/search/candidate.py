@@ -96,17 +96,17 @@ def resized_scene(problem: Problem, change: Change, backend: Backend) -> Scene:
     scene, phase = base.fit.scene, phases(settings, *problem.size)[-1]
     weights = pixel_weights(Target(problem.target, phase).image, problem.importance, settings.texture)
     rng = np.random.default_rng(settings.seed)
-    target = Target(problem.target, phase, weights)
+    target = Target(problem.target, phase, weights, problem.loss)
     step = Step(FitState.start(scene, backend, rng), settings, target)
     sizes = path_sizes(scene, base.fit.per_pixel)
     if wanted < base.size:
-        removal_costs = step.removal_costs()
+        removal_costs = step.objective.quadratic().removal_costs()
         scene = smaller(scene, removal_costs, sizes, base.size - wanted)
     else:
         count = min(math.ceil((wanted - base.size) / sizes.mean()), settings.curves - len(scene))
         if count > 0:
-            image = step.renderer.read_image()
-            scene = scene.append(new_shapes(settings, scene, target.image, image, count, rng, weights))
+            error = step.objective.by_pixel()
+            scene = scene.append(new_shapes(settings, scene, target.image, error, count, rng))
     may_choose_background = settings.background == "auto" and not settings.is_limited
     if len(scene) <= FEW_SHAPES and problem.target.shape[2] == 3 and may_choose_background:
         scene = fit_background(scene, problem.target, backend)

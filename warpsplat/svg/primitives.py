@@ -23,7 +23,7 @@ NEAR = 0.01
 is as coarse. Those of other outlines lie on whole numbers, where the handles of arcs hardly ever do."""
 
 POINT_COUNTS = (12, 18, 24)
-"""Of four arcs or lines, of four arcs and two lines, and of four of each."""
+"""Numbers of points of outlines of four arcs or lines, of four arcs and two lines, and of four of each."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Primitive:
     low: tuple[float, float]
     high: tuple[float, float]
     radii: tuple[float, float]
-    """Of the corners."""
+    """Radii of the corners."""
     is_clockwise: bool = True
     """Whether it runs from x towards y, which is clockwise on a screen."""
 
@@ -110,12 +110,30 @@ class Primitive:
 def cubics_of(made: Sequence[Primitive]) -> list[Floats]:
     """Return the arcs and sides of each of some shapes, as ``Primitive.cubics``."""
     found: list[Floats] = [np.zeros((0, 4, 2))] * len(made)
-    alike: dict[tuple[bool, bool, bool, bool], list[int]] = {}
-    for i, one in enumerate(made):
-        alike.setdefault((*one.is_round, one.radii[0] > 0, one.is_clockwise), []).append(i)
-    for (*is_round, has_arcs, is_clockwise), chosen in alike.items():
-        values = np.array([(*made[i].low, *made[i].high, *made[i].radii) for i in chosen], np.float64)
-        x0, y0, x1, y1, rx, ry = values.T
+    boxes = np.array([(*one.low, *one.high, *one.radii) for one in made], np.float64).reshape(-1, 6)
+    for chosen, cubics in _cubics(boxes, np.array([one.is_clockwise for one in made], np.bool_)):
+        for i, own in zip(chosen.tolist(), cubics, strict=True):
+            found[i] = own
+    return found
+
+
+def _are_round(boxes: Floats) -> npt.NDArray[np.bool_]:
+    """Return ``Primitive.is_round`` of boxes, shape (box, 2)."""
+    radii = boxes[:, 4:]
+    return np.asarray((radii > 0) & (boxes[:, 2:4] - boxes[:, :2] - 2 * radii < NEAR))
+
+
+def _cubics(boxes: Floats, clockwise: npt.NDArray[np.bool_]) -> Iterator[tuple[IndexArray, Floats]]:
+    """Yield which boxes have the same kinds of pieces, and these, shape (box, piece, 4, 2).
+
+    ``boxes``: lows, highs and radii, shape (box, 6).
+    """
+    kinds = np.concatenate([_are_round(boxes), boxes[:, 4:5] > 0, clockwise[:, None]], axis=1)
+    kind_numbers = (kinds * np.array([8, 4, 2, 1])).sum(axis=1)
+    for kind in np.unique(kind_numbers).tolist():
+        chosen = np.flatnonzero(kind_numbers == kind)
+        *is_round, has_arcs, is_clockwise = kinds[chosen[0]].tolist()
+        x0, y0, x1, y1, rx, ry = boxes[chosen].T
         corners = [np.stack(own, axis=1) for own in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
         nodes = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
         nodes += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
@@ -128,9 +146,7 @@ def cubics_of(made: Sequence[Primitive]) -> list[Floats]:
             if not is_round[i % 2]:
                 pieces += [b, (2 * b + c) / 3, (b + 2 * c) / 3, c]
         cubics = np.stack(pieces, axis=1).reshape(len(chosen), -1, 4, 2)
-        for i, own in zip(chosen, cubics if is_clockwise else cubics[:, ::-1, ::-1], strict=True):
-            found[i] = own
-    return found
+        yield chosen, cubics if is_clockwise else cubics[:, ::-1, ::-1]
 
 
 def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
@@ -138,14 +154,19 @@ def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
 
     ``exact``: the scene's points in units of the view box, shape (point, 2).
     """
-    for contours, made, _ in _alike(scene, exact):
-        yield from zip(contours.tolist(), made, strict=True)
+    for contours, boxes, clockwise, _ in _alike(scene, exact):
+        rows = zip(contours.tolist(), boxes.tolist(), clockwise.tolist(), strict=True)
+        for contour, (x0, y0, x1, y1, rx, ry), is_clockwise in rows:
+            yield contour, Primitive((x0, y0), (x1, y1), (rx, ry), is_clockwise)
 
 
-def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, list[Primitive], IndexArray]]:
-    """Yield contours of equally many points that are ellipses or rectangles, these, and how they are turned.
+def _alike(
+    scene: Scene, exact: Floats
+) -> Iterator[tuple[IndexArray, Floats, npt.NDArray[np.bool_], IndexArray]]:
+    """Yield contours of equally many points that are ellipses or rectangles, and what these are.
 
-    That is by how many points a contour's start is behind that of the shape's cubics.
+    That is their lows, highs and radii, shape (outline, 6), whether they are clockwise, and by how many
+    points a contour's start is behind that of the shape's cubics.
     """
     for group in scene.alike():
         count = group.points.shape[1]
@@ -163,43 +184,53 @@ def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, list[Primi
         x, y = points[..., 0], points[..., 1]
         turning = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) > 0
         chosen = np.flatnonzero(likely)
-        boxes = zip(*(own[chosen].tolist() for own in (low, high, radii, turning)), strict=True)
-        made = [Primitive((x0, y0), (x1, y1), (rx, ry), cw) for (x0, y0), (x1, y1), (rx, ry), cw in boxes]
-        near, turned = _turned(made, points[chosen])
-        yield group.contours[chosen[near]], [made[i] for i in near.tolist()], turned
+        boxes, clockwise = np.concatenate([low, high, radii], axis=1)[chosen], turning[chosen]
+        near, turned = _turned(boxes, clockwise, points[chosen])
+        yield group.contours[chosen[near]], boxes[near], clockwise[near], turned
 
 
-def _turned(made: Sequence[Primitive], points: Floats) -> tuple[IndexArray, IndexArray]:
-    """Return which shapes outlines (outline, point, 2) are, and by how many points those start later."""
+def _turned(boxes: Floats, clockwise: npt.NDArray[np.bool_], points: Floats) -> tuple[IndexArray, IndexArray]:
+    """Return which boxes the outlines (outline, point, 2) are, and by how many points those start later."""
     count = points.shape[1]
-    rings = [cubics[:, :3].reshape(-1, 2) for cubics in cubics_of(made)]
-    same = np.array([i for i, ring in enumerate(rings) if len(ring) == count], np.intp)
-    if not len(same):
-        return same, same
-    ring, points = np.stack([rings[i] for i in same.tolist()]), points[same]
-    turned = np.abs(ring - points[:, :1]).sum(axis=2).argmin(axis=1)
-    rows = (turned[:, None] + np.arange(count)) % count
-    near = np.abs(np.take_along_axis(ring, rows[..., None], axis=1) - points).max(axis=(1, 2)) <= NEAR
-    return same[near], turned[near]
+    near, turned = np.zeros(len(boxes), np.bool_), np.zeros(len(boxes), np.intp)
+    for chosen, cubics in _cubics(boxes, clockwise):
+        ring, own = cubics[:, :, :3].reshape(len(chosen), -1, 2), points[chosen]
+        if ring.shape[1] == count:
+            turned[chosen] = np.abs(ring - own[:, :1]).sum(axis=2).argmin(axis=1)
+            near[chosen] = np.abs(_begun(ring, turned[chosen]) - own).max(axis=(1, 2)) <= NEAR
+    return np.flatnonzero(near), turned[near]
 
 
-def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[slice, Floats]]:
+def _begun(rings: Floats, first: IndexArray) -> Floats:
+    """Return rings (ring, point, 2) that begin with their points ``first``."""
+    rows = (first[:, None] + np.arange(rings.shape[1])) % rings.shape[1]
+    return np.take_along_axis(rings, rows[..., None], axis=1)
+
+
+def _rounded(boxes: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Return boxes as ``Primitive.rounded``, and which of them are left."""
+    low, high, exact = boxes[:, :2], boxes[:, 2:4], boxes[:, 4:]
+    radii, middle, is_round = np.round(exact), np.round((low + high) / 2), _are_round(boxes)
+    low = np.where(is_round, middle - radii, np.round(low))
+    high = np.where(is_round, middle + radii, np.round(high))
+    left = (radii >= (exact > 0)) & (high - low >= np.maximum(1, 2 * radii))
+    return np.concatenate([low, high, radii], axis=1), np.asarray(left.all(axis=1))
+
+
+def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, Floats]]:
     """Yield the rows and the points, in whole numbers but for handles, of ellipses and rounded rectangles.
 
-    Arguments are those of ``primitives``.
+    Arguments are those of ``primitives``. Shapes (outline, point) and (outline, point, 2).
     """
-    for contours, made, turned in _alike(scene, exact):
-        held = [one.rounded() if one.radii[0] > 0 else None for one in made]
-        rings = iter(cubics_of([one for one in held if one]))
-        for contour, one, start in zip(contours.tolist(), held, turned.tolist(), strict=True):
-            if one is None:
-                continue
-            rows, ring = (
-                slice(*scene.starts[contour : contour + 2].tolist()),
-                next(rings)[:, :3].reshape(-1, 2),
-            )
-            if len(ring) == rows.stop - rows.start:
-                yield rows, np.roll(ring, -start, axis=0)
+    for contours, boxes, clockwise, turned in _alike(scene, exact):
+        held, left = _rounded(boxes)
+        index = np.flatnonzero(left & (boxes[:, 4] > 0))
+        for chosen, cubics in _cubics(held[index], clockwise[index]):
+            own = index[chosen]
+            rings = cubics[:, :, :3].reshape(len(own), -1, 2)
+            starts = scene.starts[contours[own]]
+            if len(own) and rings.shape[1] == scene.starts[contours[own[0]] + 1] - starts[0]:
+                yield starts[:, None] + np.arange(rings.shape[1]), _begun(rings, turned[own])
 
 
 def held_rounds(scene: Scene, per_pixel: float) -> npt.NDArray[np.bool_]:

@@ -130,6 +130,20 @@ def timed(device: wp.Device, work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
+def passes_of(renderer: Renderer) -> Callable[[], None]:
+    """Return a function that runs the forward and the backward pass, as a graph where there can be one."""
+    graph = capture(renderer.backend.device, (renderer.forward_program, renderer.backward_program))
+
+    def run() -> None:
+        if graph:
+            wp.capture_launch(graph)
+        else:
+            renderer.forward()
+            renderer.backward()
+
+    return run
+
+
 def time_steps(step: Step, repeats: int) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up: as a whole, as two passes, and launch by launch.
 
@@ -137,11 +151,11 @@ def time_steps(step: Step, repeats: int) -> dict[str, Any]:
         summaries of ``step``, ``forward_backward``, and of all ``stages`` and ``kernels``.
     """
     device, renderer = step.renderer.backend.device, step.renderer
-    steps, passes = [], []
+    steps, passes, own_passes = [], [], passes_of(renderer)
     launches: list[dict[tuple[str, str], float]] = []
     for _ in range(repeats + WARM_UP):
         steps.append(timed(device, step.advance))
-        passes.append(timed(device, renderer.forward) + timed(device, renderer.backward))
+        passes.append(timed(device, own_passes))
         sums: dict[tuple[str, str], float] = defaultdict(float)
         for program in step.programs:
             for key, value in program.run_timed().items():
@@ -181,19 +195,14 @@ def time_torch(own: Renderer, repeats: int) -> dict[str, Any]:
     tensors = SceneTensors.of(own.parameters.scene(), torch_device, requires_grad=True)
     inputs = [value for value in tensors.values.values() if value.requires_grad]
     gradient = torch.rand(viewport.height, viewport.width, 4, dtype=torch.float32, device=torch_device)
-    graph = capture(device, (own.forward_program, own.backward_program))
+    own_passes = passes_of(own)
 
-    def own_pass() -> None:
-        if graph:
-            wp.capture_launch(graph)
-        else:
-            own.forward()
-            own.backward()
-
-    def torch_pass() -> None:
+    def torch_passes() -> None:
         image = render(tensors, viewport.width, renderer=own.model, threads=own.backend.threads)
         torch.autograd.grad(image, inputs, gradient)
 
-    pairs = [(timed(device, own_pass), timed(device, torch_pass)) for _ in range(repeats + WARM_UP)][WARM_UP:]
+    pairs = [(timed(device, own_passes), timed(device, torch_passes)) for _ in range(repeats + WARM_UP)][
+        WARM_UP:
+    ]
     ratio = round(statistics.median(theirs / ours for ours, theirs in pairs), 3)
     return {"own": summary([a for a, _ in pairs]), "torch": summary([b for _, b in pairs]), "ratio": ratio}

@@ -8,7 +8,7 @@ import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 import warp as wp
@@ -23,7 +23,7 @@ from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.scene import TRAITS, Scene
+from warpsplat.scene import OPACITY_RANGE, TRAITS, Scene
 from warpsplat.torch.tensors import attributes_of
 
 KEPT = 32
@@ -45,8 +45,9 @@ class RenderSpec:
     model: Model
     device: torch.device
     threads: int
-    opaque: bool
-    """Whether an opacity is so near to 1 that its gradient takes another adjoint."""
+    opaque: bool | None
+    """Whether an opacity is so near to 1 that its gradient takes another adjoint; None until the values are
+    known."""
     straight: bool = False
     """Whether the image's colours are not premultiplied."""
 
@@ -77,6 +78,7 @@ class Engine:
     """A renderer with buffers of its own that calls copy into and out of. It serves one call at a time."""
 
     def __init__(self, spec: RenderSpec) -> None:
+        assert spec.opaque is not None
         backend = Backend.on(wp.device_from_torch(spec.device), spec.threads)
         parameters = Parameters(spec.layout, backend)
         self._renderer = Renderer(
@@ -93,6 +95,10 @@ class Engine:
         self.lock = threading.Lock()
         self.ticket: object = None
         """Identifies the call whose forward pass is in the buffers."""
+        self.is_captured = False
+        """Whether a CUDA graph of torch holds its programs, which then must stay as they are."""
+        self._valid = dict(VALID)
+        self._opaque = spec.opaque
         self.bytes = self._renderer.bytes()
         self._graphs: dict[Program, wp.Graph] = {}
         self._stream: torch.cuda.Stream | None = None
@@ -116,10 +122,10 @@ class Engine:
         self.ticket = None
         for name, own in self._values.items():
             own.copy_(values[name].reshape(own.shape))
-            if name in VALID:
-                own.clamp_(*VALID[name])
+            if name in self._valid:
+                own.clamp_(*self._valid[name])
         self._replay(self._renderer.forward_program)
-        if self._renderer.grow():
+        if not self.is_captured and self._renderer.grow():
             self._graphs.clear()
             self._renderer.forward_complete()
             self.bytes = self._renderer.bytes()
@@ -157,6 +163,12 @@ class Engine:
         program.rebind("pixels", array)
         program.run()
 
+    def freeze(self) -> None:
+        """Prepare for calls in a CUDA graph, after which nothing is read back."""
+        self.is_captured = True
+        if not self._opaque:
+            self._valid["opacities"] = (0.0, OPACITY_RANGE[1])
+
     def follow(self, device: torch.device) -> None:
         """Make torch's current stream wait for the last call, which may have used another one."""
         if device.type == "cuda":
@@ -169,13 +181,20 @@ class Engine:
 engines: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
 """Those used last, by the keys of their specifications."""
 
+captured: dict[tuple[object, ...], Engine] = {}
+"""Those in CUDA graphs of torch, which replay them without a call: they do nothing else."""
+
 _engines_lock = threading.Lock()
 
 
 def clear_cache() -> None:
-    """Free the renderers that are kept for further calls. They are recorded again when they are needed."""
+    """Free the renderers that are kept for further calls. They are recorded again when they are needed.
+
+    CUDA graphs of torch that hold some must not be replayed afterwards.
+    """
     with _engines_lock:
         engines.clear()
+        captured.clear()
 
 
 def check_memory(spec: RenderSpec, count: int = 1) -> None:
@@ -187,24 +206,70 @@ def check_memory(spec: RenderSpec, count: int = 1) -> None:
 def engine_of(spec: RenderSpec) -> Iterator[Engine]:
     """Yield the engine of ``spec``, for this thread alone and on torch's current stream."""
     device = _warp_device(spec.device)
-    with device_lock(device), _on_stream(spec.device):
+    capturing = is_capturing(spec.device)
+    with device_lock(device), _on_stream(spec.device, capturing):
         with _engines_lock:
-            engine = engines.pop(spec.key, None) or Engine(spec)
-            engines[spec.key] = engine
-            while len(engines) > 1 and (
-                len(engines) > KEPT or sum(each.bytes for each in engines.values()) > KEPT_BYTES
-            ):
-                engines.popitem(last=False)
+            engine = _captured_engine(spec) if capturing else _kept_engine(spec)
         with engine.lock:
-            engine.follow(spec.device)
+            if not capturing:
+                engine.follow(spec.device)
             yield engine
 
 
-def _on_stream(device: torch.device) -> contextlib.AbstractContextManager[object]:
-    """Have Warp work on torch's current stream."""
+def _kept_engine(spec: RenderSpec) -> Engine:
+    """Return an engine of ``engines``, or a new one; those that have not been used for longest are freed."""
+    engine = engines.pop(spec.key, None) or Engine(spec)
+    engines[spec.key] = engine
+    while len(engines) > 1 and (
+        len(engines) > KEPT or sum(each.bytes for each in engines.values()) > KEPT_BYTES
+    ):
+        engines.popitem(last=False)
+    return engine
+
+
+def _captured_engine(spec: RenderSpec) -> Engine:
+    """Return an engine of ``captured``, or one that leaves ``engines``, with the capacity that it has."""
+    engine = captured.get(spec.key) or engines.pop(spec.key)
+    captured[spec.key] = engine
+    engine.freeze()
+    return engine
+
+
+def is_capturing(device: torch.device) -> bool:
+    """Return whether torch is capturing a CUDA graph on its current stream: nothing can be read back then."""
+    return device.type == "cuda" and torch.cuda.is_current_stream_capturing()
+
+
+def known(spec: RenderSpec) -> RenderSpec:
+    """Return ``spec`` with the ``opaque`` of an engine that there is, preferably true: it suits all values.
+
+    Raises:
+        UsageError: there is no engine.
+    """
+    for opaque in (True, False):
+        found = replace(spec, opaque=opaque)
+        if found.key in captured or found.key in engines:
+            return found
+    raise UsageError("a CUDA graph can only hold a scene of a structure and size that was rendered before")
+
+
+def _on_stream(device: torch.device, capturing: bool) -> contextlib.AbstractContextManager[object]:
+    """Have Warp work on torch's current stream, and take part in a capture there."""
     if device.type == "cpu":
         return contextlib.nullcontext()
-    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
+    stream = wp.stream_from_torch(torch.cuda.current_stream(device))
+    return _captured_stream(stream) if capturing else wp.ScopedStream(stream)
+
+
+@contextlib.contextmanager
+def _captured_stream(stream: wp.Stream) -> Iterator[None]:
+    """Have Warp work on a stream that torch captures."""
+    with wp.ScopedStream(stream, sync_enter=False):  # Warp's own stream is not part of the capture
+        wp.capture_begin(stream=stream, external=True)
+        try:
+            yield
+        finally:
+            wp.capture_end(stream=stream)
 
 
 _start = functools.cache(start_warp)

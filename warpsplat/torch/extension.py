@@ -1,5 +1,5 @@
-"""The PyTorch interface adds nothing to the command line."""
+"""The PyTorch interface: losses for fits; the command line gets nothing from it."""
 
 from warpsplat.extensions import Extension
 
-EXTENSION = Extension()
+EXTENSION = Extension(provides={"torch_loss": "warpsplat.torch.loss:with_gradient"})

@@ -11,17 +11,29 @@ from warpsplat.fit.optimizer import units_of
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import Scene
+from warpsplat.scene.scene import check_scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import render
 from warpsplat.torch.tensors import TABLE, WITHOUT_GRADIENT, SceneTensors, attributes_of
 
 
 class Module(torch.nn.Module):
-    """A scene with a parameter for each attribute that some shape of it has."""
+    """A scene with a parameter for each attribute that some shape of it has, in the shape of its field."""
+
+    points: torch.nn.Parameter
+    colors: torch.nn.Parameter
+    opacities: torch.nn.Parameter
+    widths: torch.nn.Parameter
+    frames: torch.nn.Parameter
+    stop_offsets: torch.nn.Parameter
+    stop_colors: torch.nn.Parameter
+    stop_opacities: torch.nn.Parameter
+    fades: torch.nn.Parameter
 
     def __init__(self, scene: Scene, *, renderer: Any = "exact", threads: int | None = None) -> None:
         """Copy the attributes of ``scene``; ``renderer``, ``threads``: see ``render``."""
         super().__init__()
+        check_scene(scene)
         self._layout, self._renderer, self._threads = scene, renderer, threads
         soft = isinstance(renderer, str) and renderer_of(renderer).soft
         fixed = WITHOUT_GRADIENT if soft else (*WITHOUT_GRADIENT, "fades")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import torch
 
+from warpsplat.field_docs import described
 from warpsplat.scene import ATTRIBUTES, Attribute, Scene, Unit
+from warpsplat.scene.scene import check_scene
 
 TABLE = {attribute.name: attribute for attribute in ATTRIBUTES}
 
@@ -17,6 +21,7 @@ WITHOUT_GRADIENT = ("focus",)
 """Attributes whose gradient is not computed."""
 
 
+@described
 @dataclass(frozen=True)
 class SceneTensors:
     """Shapes whose attributes are tensors, on one device."""
@@ -24,21 +29,26 @@ class SceneTensors:
     layout: Scene
     """All that stays: canvas, kinds, contours, bases, styles, paints; and attributes that have no tensor."""
     values: Mapping[str, torch.Tensor]
-    """By names of ``ATTRIBUTES``: float32, in the shapes and units of the fields of ``Scene``."""
+    """By names of ``ATTRIBUTES``: float32 or float64, in the shapes and units of the fields of ``Scene``.
+    Those of float64 are rendered in float32; their gradients are float64."""
 
     def __post_init__(self) -> None:
         """Check that the tensors fit the layout.
 
         Raises:
             ValueError: an unknown name, another shape than the layout's, or several devices.
-            TypeError: not a tensor, or not of float32.
+            TypeError: not a tensor, or neither float32 nor float64.
         """
+        if torch.compiler.is_compiling():
+            return  # the operator checks them, when it runs
+        if not isinstance(self.layout, Scene):
+            raise TypeError(f"the layout is a {type(self.layout).__name__}, not a Scene")
         for name, value in self.values.items():
             if name not in TABLE:
                 raise ValueError(f"no attribute {name!r}; there are {', '.join(TABLE)}")
             if not isinstance(value, torch.Tensor):
                 raise TypeError(f"{name} is a {type(value).__name__}, not a torch.Tensor")
-            if value.dtype != torch.float32:
+            if value.dtype not in (torch.float32, torch.float64):
                 raise TypeError(f"{name} is {value.dtype}, not torch.float32")
             wanted = self.layout.shape_of(TABLE[name])
             if tuple(value.shape) != wanted:
@@ -56,6 +66,7 @@ class SceneTensors:
 
         ``requires_grad``: whether the attributes that some shape has require gradients.
         """
+        check_scene(scene)
         values = {name: torch.tensor(getattr(scene, name), device=device) for name in TABLE}
         if requires_grad:
             for attribute in attributes_of(scene):
@@ -65,14 +76,20 @@ class SceneTensors:
     @property
     def device(self) -> torch.device:
         """The tensors' device; the CPU if there are none."""
-        return next((value.device for value in self.values.values()), torch.device("cpu"))
+        return next(iter(self.values.values())).device if self.values else torch.device("cpu")
 
     def value(self, attribute: Attribute) -> torch.Tensor:
-        """Return the tensor of ``attribute``, or a copy of the layout's array."""
+        """Return the tensor of ``attribute`` in float32, or a copy of the layout's array."""
         found = self.values.get(attribute.name)
         if found is None:
             return torch.tensor(getattr(self.layout, attribute.name), dtype=torch.float32)
-        return found
+        if found.dtype == torch.float64:
+            _warn_of_float64()
+        return found.float()
+
+    def drawn(self) -> dict[str, torch.Tensor]:
+        """Return the attributes that some shape has, by name, in float32."""
+        return {attribute.name: self.value(attribute) for attribute in attributes_of(self.layout)}
 
     def scene(self) -> Scene:
         """Return a scene of the current values, clamped to what a file can hold.
@@ -92,13 +109,25 @@ class SceneTensors:
         return replace(scene, twin=twin)
 
 
+@functools.cache
+def _warn_of_float64() -> None:
+    """Warn once."""
+    warnings.warn(
+        "warpsplat.torch renders in float32; gradients of float64 tensors are float64", stacklevel=2
+    )
+
+
 def check_finite(values: Mapping[str, torch.Tensor]) -> None:
     """Raise a ``ValueError`` if a number is not finite, with one transfer from the device."""
     each = [value.detach().isfinite().all() for value in values.values()]
     finite = torch.stack(each).tolist() if each else []
     if not all(finite):
-        wrong = ", ".join(name for name, fine in zip(values, finite, strict=True) if not fine)
-        raise ValueError(f"{wrong}: numbers that are not finite")
+        raise not_finite(name for name, fine in zip(values, finite, strict=True) if not fine)
+
+
+def not_finite(names: Iterable[str]) -> ValueError:
+    """Return the error for attributes that have numbers that are not finite."""
+    return ValueError(f"{', '.join(names)}: numbers that are not finite")
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:

@@ -75,6 +75,39 @@ def discs() -> FloatArray:
     return image
 
 
+def sprite() -> FloatArray:
+    """16 x 16 pixels, shaded in some 40 tones, most of them rare; around it nothing."""
+    rng = np.random.default_rng(3)
+    tones = (rng.integers(0, 256, (40, 3)) / 255)[np.minimum(rng.integers(0, 40, (16, 16)), 39)]
+    inside = np.hypot(*(np.mgrid[:16, :16] - 7.5)) < 7
+    return np.dstack([tones * inside[..., None], inside]).astype(np.float32)
+
+
+def table() -> FloatArray:
+    """An outline of a table with round corners, on a grid of 8 px: no cells."""
+    text = (
+        '<rect x="12" y="12" width="136" height="136" rx="12" fill="none" stroke="#123" stroke-width="8"/>'
+        '<path d="M12 52H148M12 92H148M52 12V148M92 12V148" fill="none" stroke="#123" stroke-width="8"/>'
+    )
+    discs = "".join(
+        f'<circle cx="{32 + 40 * x}" cy="{32 + 40 * y}" r="10" fill="#123"/>'
+        for x in range(3)
+        for y in range(3)
+    )
+    return draw(ground("#fff", 160, 160) + text + discs, 160, 160)
+
+
+def words_on_shade() -> FloatArray:
+    """Thin ink on a plain ground, beside a shaded and grainy disc."""
+    image = np.full((160, 240, 3), 0.2, np.float32)
+    strokes = "".join(f"M{4 + 6 * i} {4 + 24 * j}v{12 - 2 * (i % 4)}h3" for i in range(22) for j in range(6))
+    text = f'<path d="{strokes}" fill="none" stroke="#fff" stroke-width="2"/>'
+    image[:, :140] = draw(ground("#333", 140, 160) + text, 140, 160)
+    disc = np.hypot(*(np.mgrid[:160, :240] - np.array([80, 190])[:, None, None])) < 45
+    image[disc] = grainy(photograph(240)[:160], 4)[disc]
+    return image
+
+
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -92,6 +125,9 @@ PICTURES = {
     "hard discs": (discs(), "drawing"),
     "code": (cells(25, 4, 2), "pixel"),
     "sprite": (cells(32, 1, 6), "pixel"),
+    "shaded sprite": (sprite(), "pixel"),
+    "table": (table(), "drawing"),
+    "words beside a photograph": (words_on_shade(), "drawing"),
 }
 
 

@@ -82,14 +82,15 @@ FINE = 1100  # [px] longer side of an image up to which its ink is thinned at tw
 MOST = 20_000  # lines: the longest
 
 
-def find_lines(ink: Ink, *, mixed: bool = False) -> Strokes:
+def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Strokes:
     """Find the centre lines of ``ink``; through junctions they go straight on.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas; otherwise rings fill them.
+        only_lines: Whether it has no broad parts, however wide it is.
     """
-    split = _split(ink, mixed=mixed)
+    split = _Split(ink) if only_lines else _split(ink, mixed=mixed)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     graph, radii = find_graph(split.thin.mask if fine == 1 else _enlarged(split.thin, fine))
     if len(graph.edges) > MOST:

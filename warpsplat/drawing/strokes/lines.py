@@ -51,14 +51,15 @@ class _Stroke:
         return Polyline(self.points[1:-1], False, self.points[0], self.points[-1])
 
 
-def trace_ink(ink: Ink, *, mixed: bool = False) -> TracedLines:
+def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> TracedLines:
     """Trace the centre lines of ink as opaque strokes, with a layer for each pen.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas, which are not traced.
+        only_lines: Whether it has no broad parts, however wide it is.
     """
-    found = find_lines(ink, mixed=mixed)
+    found = find_lines(ink, mixed=mixed, only_lines=only_lines)
     strokes = [stroke for line in found.lines for stroke in _strokes(line, thin=not ink.textured)]
     strokes.sort(key=lambda stroke: stroke.pen)
     fitted = fit_polylines([stroke.polyline() for stroke in strokes], TOLERANCE)

@@ -22,8 +22,8 @@ CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor
 
 
 @dataclass(frozen=True)
-class Candidates:
-    """Pieces that may be parts of chains."""
+class CurvePieces:
+    """CurvePieces that may be parts of chains."""
 
     span: Ints
     """The span that each is in, shape (candidate,)."""
@@ -37,19 +37,19 @@ class Candidates:
     costs: Floats
     """Infinite where neither is near enough, shape (candidate,)."""
 
-    def take(self, index: Ints | Bools) -> Candidates:
+    def take(self, index: Ints | Bools) -> CurvePieces:
         """Return some of them."""
-        return Candidates(*(getattr(self, field.name)[index] for field in fields(Candidates)))
+        return CurvePieces(*(getattr(self, field.name)[index] for field in fields(CurvePieces)))
 
     @staticmethod
-    def joined(parts: list[Candidates]) -> Candidates:
+    def joined(parts: list[CurvePieces]) -> CurvePieces:
         """Return those of several groups."""
-        return Candidates(
-            *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Candidates))
+        return CurvePieces(
+            *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(CurvePieces))
         )
 
 
-def cheapest_chains(spans: Spans, tolerance: float) -> Candidates:
+def cheapest_chains(spans: Spans, tolerance: float) -> CurvePieces:
     """Return the pieces of the cheapest chain of each span, in order.
 
     A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
@@ -77,11 +77,11 @@ def cheapest_chains(spans: Spans, tolerance: float) -> Candidates:
     pairs = np.cumsum((last - first)[rest] ** 2)
     for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):
         found.append(_cheapest(spans, group, tolerance))
-    chains = Candidates.joined(found)
+    chains = CurvePieces.joined(found)
     return chains.take(np.argsort(chains.begin, kind="stable"))
 
 
-def _cheapest(spans: Spans, group: Ints, tolerance: float) -> Candidates:
+def _cheapest(spans: Spans, group: Ints, tolerance: float) -> CurvePieces:
     """Return the cheapest chains of some spans, by dynamic programming over pairs of knots."""
     first, last = spans.first[group], spans.first[group + 1] - 1
     number, begin, end = _pairs(last - first + 1)
@@ -120,13 +120,13 @@ def _pairs(counts: Ints) -> tuple[Ints, Ints, Ints]:
     return np.repeat(owner, after), np.repeat(low, after), ranges(low + 1, after)
 
 
-def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> Candidates:
+def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> CurvePieces:
     """Return candidates between knots, shape (candidate,) each."""
     parts = [slice(low, low + CHUNK) for low in range(0, max(len(span), 1), CHUNK)]
-    return Candidates.joined([_some(spans, span[i], begin[i], end[i], tolerance) for i in parts])
+    return CurvePieces.joined([_some(spans, span[i], begin[i], end[i], tolerance) for i in parts])
 
 
-def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> Candidates:
+def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> CurvePieces:
     """Return candidates as ``_candidates``, not so many."""
     low, high = spans.places[begin], spans.places[end]
     where = low + (high - low) * np.linspace(0, 1, SAMPLES)[:, None]
@@ -149,7 +149,7 @@ def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) ->
     cubics[bent, 1] += handles[0][:, None] * ahead
     cubics[bent, 2] += handles[1][:, None] * back
     costs[bent] = _costs(errors, CUBIC_COST, tolerance)
-    return Candidates(span, begin, end, cubics, is_line, costs)
+    return CurvePieces(span, begin, end, cubics, is_line, costs)
 
 
 def _costs(errors: Floats, base: float, tolerance: float) -> Floats:

@@ -102,7 +102,7 @@ class HiddenPaths:
 
     cover: Cover
     rank: Ints
-    """Of the region that each path is hidden from, shape (path,)."""
+    """Rank of the region that each path is hidden from, shape (path,)."""
     has_holes: bool
     """Whether what is above may have holes, through which a path must not be seen."""
     first: Ints

@@ -36,6 +36,10 @@ EXPLAINED, EXPLAINED_SOFT, EXPLAINED_TONES = 0.93, 0.98, 0.8
 """Least share of an image's variance that its cells must explain; of a smooth one any would explain much.
 Blur takes the corners off cells of two tones."""
 
+STRAY, MOST_STRAY = 96, 0.001
+"""[levels] that few pixels in the middles of cells may be off; largest share of them. Blur and noise spare
+most middles, round corners of a drawing on a grid do not."""
+
 LEAST_EDGES = 0.02
 """Least share of the pixels at which dark and light ones meet, along each axis, for cells of two tones."""
 
@@ -242,6 +246,9 @@ def _with_colors(levels: Ints, axes: tuple[Axis, Axis], soft: bool, least: float
         mixed = _averaged(_averaged(colors, down, height, 0), across, width, 1)
         error = min(error, np.square(levels - mixed), key=np.sum)
     if error.sum() > (1 - least) * variance.sum():
+        return None
+    strays = np.abs(levels[inside].reshape(shape) - colors[:, None, :, None]).max(axis=4) > STRAY
+    if strays.mean() > MOST_STRAY:
         return None
     found = _numbered(colors, NOISES * float(np.sqrt(np.median(error))))
     return Lattice(columns, rows, *found) if found else None

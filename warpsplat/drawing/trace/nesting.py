@@ -23,7 +23,7 @@ class Nesting:
     depth: Ints
     """How many regions lie below it, shape (region,)."""
     colorings: list[Coloring]
-    """What each is painted with, to look as it does on what lies below."""
+    """Paint that gives each region its look on top of what lies below."""
 
     def shown(self, depth: int) -> Ints:
         """Return the region that each lies in if none is painted that lies deeper than ``depth``."""

@@ -79,7 +79,7 @@ class Polylines:
 
     @cached_property
     def _bases(self) -> Floats:
-        """What is added to arc lengths so that those of all polylines ascend, shape (polyline,)."""
+        """Offsets with which the arc lengths of all polylines ascend, shape (polyline,)."""
         return np.concatenate([[0.0], np.cumsum(self.totals + 1)])[:-1]
 
     @cached_property

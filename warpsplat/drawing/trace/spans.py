@@ -52,7 +52,7 @@ class Spans:
     owner: Ints
     """The run that each is a part of, shape (span,)."""
     points: Floats
-    """Of all, shape (point, 2)."""
+    """Points of all spans, shape (point, 2)."""
     first: Ints
     """First knot of each and, last, the number of knots, shape (span + 1,)."""
     knots: Floats

@@ -43,7 +43,7 @@ class _Mixed:
     """Number of the one colouring, shape (pixel,)."""
     second: Ints
     share: Floats
-    """Of the first one, shape (pixel,)."""
+    """Share of the first region, shape (pixel,)."""
 
 
 def with_sub_pixels(regions: Regions) -> Regions:

@@ -1,0 +1,255 @@
+"""Losses of the user's own, from the first step to the file."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpsplat
+from tests.fit.pictures import picture, step_for
+from tests.helpers import relative_error
+from tests.scenes import random_scene
+from warpsplat import CustomLoss
+from warpsplat.alpha import squares
+from warpsplat.errors import UsageError
+from warpsplat.fit.custom_loss import uses_torch
+from warpsplat.fit.export import export, shown_image
+from warpsplat.fit.rounding import evaluate_file
+from warpsplat.fit.settings import make_settings
+from warpsplat.fit.step import Step
+from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.write import write_svg
+
+PICTURE = picture(48, 36)
+CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
+CLEAR[:12, :20] = 0
+
+Both = tuple[Any, Any]
+
+
+def squared(image: FloatArray, target: FloatArray) -> Both:
+    """The squared error; with opacity the mean of those on black and on white."""
+    error = image - target
+    gradient = 2 * error / error[..., :3].size
+    if error.shape[2] == 4:
+        white = error[..., :3] - error[..., 3:]
+        mean = (error[..., :3] + white) / error[..., :3].size
+        gradient = np.concatenate([mean, -white.sum(axis=2, keepdims=True) / error[..., :3].size], axis=2)
+    return squares(error) / 3, gradient
+
+
+def slopes(image: FloatArray, target: FloatArray) -> Both:
+    """Mean square of the differences of neighbours in a row, which even colours do not change."""
+    across = np.diff(image - target, axis=1)
+    gradient = np.zeros_like(image)
+    gradient[:, 1:] += 2 * across / across.size
+    gradient[:, :-1] -= 2 * across / across.size
+    return np.square(across).mean(), gradient
+
+
+def red(image: FloatArray, target: FloatArray) -> Both:
+    """The squared error of red."""
+    error = (image - target) * np.array([1, 0, 0], np.float32)
+    return np.square(error[..., 0]), 2 * error / error[..., 0].size
+
+
+def fitted(loss: Any, **given: Any) -> warpsplat.Result:
+    common = {"curves": 10, "iterations": 56, "seed": 1, "device": "cpu", "threads": 1}
+    return warpsplat.vectorize(**{"image": PICTURE, **common, "loss": loss, **given})
+
+
+def shown(result: warpsplat.Result) -> FloatArray:
+    return np.asarray(on_white(render_svg(result.svg)) / 255, np.float32)
+
+
+def scene_on(planes: int) -> Scene:
+    scene = random_scene(Kind.FILL, count=9, width=64, height=48, seed=1)
+    background = None if planes == 4 else np.full(3, 0.5, np.float32)
+    return scene if planes == 3 else Scene(**{**vars(scene), "canvas": Canvas(64, 48, background)})
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+@pytest.mark.parametrize("planes", [3, 4])
+def test_what_follows_from_the_squared_error_follows_from_a_loss_that_is_one(
+    device: str, planes: int, factor: float
+) -> None:
+    """Removal costs, residuals, and where the error is: from the gradient, and the curvature measured."""
+
+    def several(image: FloatArray, target: FloatArray) -> Both:
+        value, gradient = squared(image, target)
+        return factor * value, factor * gradient
+
+    target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)[..., :planes]
+    settings, found = make_settings(texture=0.0), list[list[Any]]()
+    for loss in (None, CustomLoss(several, with_target=True), CustomLoss(several, with_target=True)):
+        step = step_for(scene_on(planes), target, device, settings, loss=loss)
+        step.renderer.forward_complete()
+        near, objective = step.objective.quadratic(), step.objective
+        found.append([objective.value(), near.removal_costs(), near.residual(), objective.by_pixel()])
+    (value, costs, residual, by_pixel), one, other = found
+    assert one[0] == pytest.approx(factor * value, rel=1e-5)
+    assert relative_error(one[1], factor * costs) < 1e-2
+    assert relative_error(one[2], residual) < 1e-2
+    assert relative_error(one[3], factor / 3 * by_pixel) < 1e-4
+    np.testing.assert_array_equal(one[1], other[1])
+
+
+@pytest.mark.parametrize("loss", [slopes, "edges", "ssim"])
+def test_removal_costs_are_near_those_of_finite_removal(device: str, loss: Any) -> None:
+    """Also where those of the squared error are not."""
+    custom = CustomLoss(loss, with_target=True) if callable(loss) else None
+    settings = make_settings(loss=None if custom else loss, texture=0.0)
+    scene = random_scene(Kind.FILL, count=24, width=64, height=48, seed=2)
+    step = step_for(scene, picture(), device, settings, loss=custom)
+    step.renderer.forward_complete()
+    before, estimated, costs = step.objective.value(), step.objective.quadratic().removal_costs(), []
+    for i in range(len(scene)):
+        opacities = scene.opacities.copy()
+        opacities[i] = 0
+        step.state.parameters.assign(Scene(**{**vars(scene), "opacities": opacities}))
+        step.renderer.forward()
+        costs.append(step.objective.value() - before)
+    assert np.corrcoef(estimated, costs)[0, 1] > 0.9
+    square = step.renderer.removal_costs(step.loss_target.target)
+    assert np.corrcoef(square, costs)[0, 1] < 0.2 or not custom
+
+
+def test_a_loss_falls_further_than_without_it(device: str) -> None:
+    """Measured on the file, which is one."""
+    values = []
+    for loss in ("l2", CustomLoss(red, with_target=True)):
+        result = fitted(loss, device=device, subject="photo")
+        assert result.score and result.score.paths == 10
+        values.append(float(red(shown(result), PICTURE)[0].mean()))
+    assert values[1] < 0.8 * values[0], "over five seeds 0.21 to 0.59 times"
+
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "transparent": {"image": CLEAR},
+    "layered": {"curves": None, "levels": (4, 12), "iterations": 28},
+    "palette": {"colors": 4},
+    "paint": {"paint": "auto"},
+    "open": {"open": True},
+    "splat": {"renderer": "splat"},
+    "bytes": {"max_bytes": 1200, "curves": 34, "iterations": 16},
+    "time": {"time_budget": 2.0, "iterations": 2000},
+    "joins": {"loss": CustomLoss(squared, 1.0, with_target=True)},
+}
+
+
+@pytest.mark.parametrize("kind", OPTIONS)
+def test_with_other_options(kind: str) -> None:
+    """The loss sees images of as many planes as the target, in [0, 1]."""
+    seen = []
+
+    def watching(image: FloatArray, target: FloatArray) -> Both:
+        assert image.shape == target.shape and image.dtype == target.dtype == np.float32
+        seen.append((image.min(), image.max(), image.shape[2]))
+        return squared(image, target)
+
+    result = fitted(**{"loss": CustomLoss(watching, with_target=True), **OPTIONS[kind]})
+    assert result.score and result.score.psnr > 12
+    assert all(low >= 0 and high <= 1 for low, high, _ in seen)
+    assert {planes for *_, planes in seen} <= {4 if kind == "transparent" else 3}
+
+
+def test_a_loss_sees_what_a_viewer_shows(device: str) -> None:
+    """Once the file is evaluated; in the step after, that is what is shown of the same shapes."""
+    seen: list[FloatArray] = []
+
+    def watching(image: FloatArray) -> Both:
+        seen.append(image)
+        return 0.0, np.zeros_like(image)
+
+    scene, settings = random_scene(Kind.FILL, count=6, width=64, height=48, seed=1), make_settings()
+    step: Step = step_for(scene, picture(), device, settings, loss=CustomLoss(watching))
+    evaluate_file(step)
+    text = export(step.state.scene(), settings, step.state.per_pixel)
+    step.advance()
+    np.testing.assert_allclose(seen[-1], shown_image(text, scene, 3), atol=1e-6)
+
+
+def bad(image: FloatArray) -> Both:
+    raise ValueError("no idea\nwhat to do")
+
+
+ZEROS = np.zeros_like
+FAULTS: dict[str, tuple[Callable[[FloatArray], Any], str]] = {
+    "raises": (bad, "the loss raised ValueError: no idea"),
+    "nan": (lambda image: (np.nan, ZEROS(image)), "the loss is nan"),
+    "shape": (lambda image: (np.zeros(7), ZEROS(image)), r"the loss's value has shape \(7,\)"),
+    "flat gradient": (lambda image: (0.0, np.zeros(7)), r"the loss's gradient has shape \(7,\), not the"),
+    "infinite gradient": (lambda image: (1.0, ZEROS(image) + np.inf), "gradient has numbers that are not"),
+    "no gradient": (lambda image: 0.5, "the loss returned 0.5, without a gradient"),
+    "no number": (lambda image: ("much", ZEROS(image)), "the loss returned 'much', which is no number"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_one_clear_line(fault: str) -> None:
+    function, message = FAULTS[fault]
+    with pytest.raises(UsageError, match=message) as caught:
+        fitted(CustomLoss(function))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"loss": CustomLoss(slopes), "subject": "drawing"}, "subject drawing and a loss of your own"),
+        ({"loss": "edgy"}, "loss must be one of l2, ssim, edges, not 'edgy'"),
+        ({"loss": "ssim", "image": CLEAR}, "loss ssim needs an image without transparency"),
+        ({"loss": "edges", "subject": "pixel"}, "subject pixel and loss edges do not go together"),
+    ],
+)
+def test_refusals(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        fitted(**given)
+
+
+def test_declarations_are_checked() -> None:
+    with pytest.raises(UsageError, match="a loss is a function of a render, not 3"):
+        CustomLoss(3)
+    with pytest.raises(UsageError, match="squared_error must be a number from 0, not -1"):
+        CustomLoss(slopes, -1)
+
+
+def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    loss, path = CustomLoss(slopes, 0.1, with_target=True), tmp_path / "run.checkpoint"
+    whole = fitted(loss, colors=4)
+    steps = itertools.count(1)
+    assert fitted(loss, colors=4, checkpoint=path, stop=lambda: next(steps) >= 30).stopped
+    with pytest.raises(UsageError, match="loss differs"):
+        fitted(CustomLoss(slopes, with_target=True), colors=4, checkpoint=path, resume=True)
+    assert fitted(loss, colors=4, checkpoint=path, resume=True).svg == whole.svg
+
+
+def test_refining_is_judged_by_the_loss(device: str) -> None:
+    """A loss that wants another picture than the image: the PSNR falls, and the result is kept."""
+    text = write_svg(random_scene(Kind.FILL, count=6, width=48, height=36, seed=3))
+    start = np.asarray(on_white(render_svg(text)) / 255, np.float32)
+    loss = CustomLoss(functools.partial(squared, target=1 - start), torch=False)
+    result = warpsplat.refine(text, start, iterations=30, device=device, loss=loss)
+    assert result.before is not None and result.score and result.score.psnr < result.before
+    assert squared(shown(result), 1 - start)[0].mean() < squared(start, 1 - start)[0].mean()
+
+
+def test_functions_of_torch_are_told_by_their_file() -> None:
+    def in_file(**names: Any) -> Any:
+        return FunctionType(slopes.__code__, {"__builtins__": {}, **names})
+
+    torch = ModuleType("torch.nn.functional")
+    assert not uses_torch(slopes)
+    assert not uses_torch(in_file(np=np))
+    assert uses_torch(in_file(functional=torch))
+    assert uses_torch(functools.partial(in_file(functional=torch), target=0))
+    layer = type("Layer", (), {"__call__": in_file(F=torch), "method": in_file(F=torch)})()
+    assert uses_torch(layer) and uses_torch(layer.method)

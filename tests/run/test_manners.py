@@ -1,0 +1,124 @@
+"""Results and scenes behave as Python's own objects do: in notebooks, comparisons, sets and ``help``."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import inspect
+import math
+import pydoc
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpsplat
+from tests.scenes import contours_scene, mixed_scene, picture_scene, with_gradients
+from warpsplat.run.result import LevelScore
+from warpsplat.scene import Canvas, Kind, Picture, Rule, Scene
+from warpsplat.svg.viewer import render_svg
+
+PIXELS = np.random.default_rng(0).uniform(0, 1, (24, 32, 3))
+
+
+def pictured() -> Scene:
+    canvas = Canvas(20, 10, None)
+    return picture_scene(canvas, Picture("<g/>", (20, 10), (2, 3), np.full((4, 5, 4), 0.5, np.float32)))
+
+
+@pytest.fixture(scope="module")
+def results() -> list[warpsplat.Result]:
+    """Two runs with one seed, and one with another number of shapes."""
+    return [warpsplat.vectorize(PIXELS, n, subject="photo", iterations=6, device="cpu") for n in (4, 4, 5)]
+
+
+def test_results_of_equal_runs_are_equal(results: list[warpsplat.Result]) -> None:
+    one, same, other = results
+    assert one == same != other
+    assert len({one, same, other}) == 2
+    assert one != "another thing"
+    assert replace(one, render_psnr=math.nan) == replace(same, render_psnr=math.nan)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        mixed_scene(seed=1),
+        with_gradients(mixed_scene(seed=2)),
+        contours_scene(Kind.FILL, Rule.EVENODD),
+        pictured(),
+    ],
+)
+def test_scenes_are_equal_if_their_values_are(scene: Scene) -> None:
+    copy = replace(
+        scene, **{name: value.copy() for name, value in vars(scene).items() if isinstance(value, np.ndarray)}
+    )
+    assert copy == scene
+    assert hash(copy) == hash(scene)
+    for name, value in vars(scene).items():
+        if isinstance(value, np.ndarray) and value.size and value.dtype == np.float32:
+            assert replace(scene, **{name: value + 1}) != scene, name
+    assert scene.take(np.arange(len(scene) - 1)) != scene
+    for changed in ({"background": np.ones(3, np.float32)}, {"background": None, "crisp": True}):
+        assert replace(scene, canvas=replace(scene.canvas, **changed)) != scene
+    assert scene != 3
+
+
+def test_a_repr_is_a_line(results: list[warpsplat.Result]) -> None:
+    result = results[0]
+    figures = rf"4 shapes, {result.score.psnr:.2f} dB, {len(result.svg)} bytes, photo, \d+\.\d s"  # type: ignore[union-attr]
+    assert re.fullmatch(rf"Result\({figures}\)", repr(result))
+    assert repr(replace(result, score=None, stopped=True)).endswith("s, stopped)")
+    assert (
+        repr(result.scene)
+        == f"Scene(32x24 px, 4 shapes, 0 of them strokes, {len(result.scene.points)} points)"
+    )
+
+
+def test_notebooks_show_the_file(results: list[warpsplat.Result]) -> None:
+    result = results[0]
+    assert result._repr_svg_() == result.svg
+    shown = result._repr_html_()
+    assert repr(result)[len("Result(") : -1] in shown
+    source = re.search(r'src="data:image/svg\+xml;base64,([^"]*)"', shown)
+    assert source
+    assert render_svg(base64.b64decode(source[1]).decode()).size == (32, 24)
+
+
+def test_a_scene_is_scored_as_its_file(results: list[warpsplat.Result]) -> None:
+    scene = results[0].scene
+    assert warpsplat.score(scene, PIXELS) == warpsplat.score(warpsplat.save_svg(scene), PIXELS)
+
+
+@pytest.mark.parametrize(
+    "shape", ['<rect x="2" width="9" height="9"/>', '<circle r="9"/>', '<ellipse rx="9" ry="5"/>']
+)
+def test_every_element_that_draws_is_counted(shape: str) -> None:
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="32" height="24">{3 * shape}</svg>'
+    assert warpsplat.score(svg, PIXELS).paths == 3
+
+
+DESCRIBED = (
+    *(warpsplat.Result, LevelScore, warpsplat.Score, warpsplat.Progress, warpsplat.Snapshot),
+    *(warpsplat.Expected, warpsplat.Suggestion, warpsplat.Scene, warpsplat.Canvas, Picture),
+)
+
+
+@pytest.mark.parametrize("cls", DESCRIBED)
+def test_help_describes_every_field(cls: Any) -> None:
+    text = inspect.getdoc(cls) or ""
+    for field in dataclasses.fields(cls):
+        assert re.search(rf"^    {field.name}: \S", text, re.MULTILINE), field.name
+
+
+def test_help_describes_settings_as_the_command_line_does() -> None:
+    assert "    curves: Number of shapes; with a goal, the maximum." in (warpsplat.Settings.__doc__ or "")
+
+
+def test_help_begins_with_the_calls_that_matter() -> None:
+    text = pydoc.plain(pydoc.render_doc(warpsplat))
+    beginning = "\n".join(text.splitlines()[:16])
+    for name in ("vectorize", "refine", "load_svg", "save_svg", "render", "score"):
+        assert name in beginning

@@ -1,0 +1,114 @@
+"""Each wrong use of the library is refused in one line that says what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import warpsplat
+from tests.scenes import mixed_scene, random_scene
+from warpsplat.errors import ImageError, ResourceError, UsageError
+from warpsplat.scene import Canvas, Kind
+from warpsplat.torch import Module, SceneTensors, render
+
+pytestmark = pytest.mark.usefixtures("single_precision")
+
+SCENE, SPLINES, LARGE = (
+    random_scene(Kind.FILL),
+    mixed_scene(seed=1),
+    random_scene(Kind.FILL, width=500, height=450),
+)
+PIXELS = np.zeros((36, 40, 3))
+
+
+def drawn(**options: Any) -> Callable[[], object]:
+    return lambda: render(SceneTensors(SPLINES, {}), **options)
+
+
+def valued(**values: Any) -> Callable[[], object]:
+    return lambda: render(SceneTensors(SCENE, values))
+
+
+def twice() -> None:
+    points = torch.tensor(SCENE.points, requires_grad=True)
+    loss = render(SceneTensors(SCENE, {"points": points})).square().sum()
+    (gradient,) = torch.autograd.grad(loss, points, create_graph=True)
+    gradient.sum().backward()
+
+
+WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
+    # Values
+    (ValueError, "no attribute 'colour'; there are points, ", valued(colour=torch.zeros(4))),
+    (ValueError, r"colors has shape \(3,\), not \(4, 3\)", valued(colors=torch.zeros(3))),
+    (TypeError, "colors is torch.float16, not torch.float32", valued(colors=torch.zeros(4, 3).half())),
+    (
+        TypeError,
+        "colors is torch.int64, not torch.float32",
+        valued(colors=torch.zeros(4, 3, dtype=torch.int64)),
+    ),
+    (TypeError, "colors is a ndarray, not a torch.Tensor", valued(colors=np.zeros((4, 3), np.float32))),
+    (ValueError, "^colors: numbers that are not finite", valued(colors=torch.full((4, 3), torch.nan))),
+    (
+        ValueError,
+        "^points: numbers that are not finite",
+        valued(points=torch.tensor(SCENE.points) + torch.inf),
+    ),
+    (ValueError, "focus has no gradient here", valued(focus=torch.zeros(4, 3, requires_grad=True))),
+    (
+        ValueError,
+        "colors is on meta",
+        valued(opacities=torch.ones(4), colors=torch.zeros(4, 3, device="meta")),
+    ),
+    (
+        UsageError,
+        "tensors are on meta, neither on the CPU nor on CUDA",
+        valued(opacities=torch.ones(4, device="meta")),
+    ),
+    (RuntimeError, "differentiate twice", twice),
+    # Sizes
+    (UsageError, "width must be a whole number from 1 to .*, not 0", drawn(width=0)),
+    (UsageError, "height must be a whole number from 1 to .*, not -5", drawn(height=-5)),
+    (UsageError, "width must be a whole number from 1 to .*, not 64.5", drawn(width=64.5)),
+    (UsageError, "40x72 px do not have the proportions of 40x36", drawn(width=40, height=72)),
+    (UsageError, "scenes of several sizes or devices", lambda: render([SCENE, LARGE])),
+    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: render(LARGE, 30_000)),
+    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: warpsplat.render(LARGE, 30_000)),
+    (ResourceError, "would take about .* GB, memory for it is", lambda: render([LARGE] * 100, 20_000)),
+    (ValueError, "a canvas of 0x64 px has no pixel", lambda: Canvas(0, 64, None)),
+    # Options
+    (UsageError, "renderer must be one of exact.*, not 'fast'", drawn(renderer="fast")),
+    (ValueError, "is a spline", drawn(renderer="splat")),
+    (UsageError, "threads must be a whole number from 1, not 'a'", drawn(threads="a")),
+    (UsageError, "threads must be a whole number from 1, not 0", drawn(threads=0)),
+    (UsageError, "threads must be a whole number from 1, not -1", drawn(threads=-1)),
+    # Things that are no scenes
+    (UsageError, "no scene to render", lambda: render([])),
+    (TypeError, r"as in module\(\); render takes its tensors\(\)", lambda: render(Module(SPLINES))),  # type: ignore[arg-type]
+    (TypeError, "takes SceneTensors or a Scene, or a list of them, not str", lambda: render("<svg")),  # type: ignore[arg-type]
+    (TypeError, "or a list of them, not int", lambda: render([SPLINES, 3])),  # type: ignore[list-item]
+    (TypeError, "not str: warpsplat.load_svg reads one", lambda: SceneTensors.of("<svg/>")),  # type: ignore[arg-type]
+    (TypeError, "the layout is a str, not a Scene", lambda: SceneTensors("<svg/>", {})),  # type: ignore[arg-type]
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: Module(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: warpsplat.save_svg(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
+    (TypeError, "a Scene is needed, not Result", lambda: warpsplat.save_svg(warpsplat.vectorize(PIXELS))),  # type: ignore[arg-type]
+    (TypeError, "is its text, a path, bytes or a file, not NoneType", lambda: warpsplat.render(None)),  # type: ignore[arg-type]
+    (ImageError, "the SVG: is empty: give an SVG's text", lambda: warpsplat.load_svg("")),
+    (
+        TypeError,
+        "an image is a path, .* or an array, not Tensor",
+        lambda: warpsplat.vectorize(torch.zeros(36, 40, 3)),
+    ),  # type: ignore[arg-type]
+]
+"""Error, pattern of its message, use."""
+
+
+@pytest.mark.parametrize(("kind", "message", "use"), WRONG, ids=[message for _, message, _ in WRONG])
+def test_one_line_says_what_is_wrong(kind: type[Exception], message: str, use: Callable[[], Any]) -> None:
+    with pytest.raises(kind, match=message) as raised:
+        use()
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 200

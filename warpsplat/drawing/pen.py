@@ -1,0 +1,178 @@
+"""Fills that a round pen draws, as strokes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.drawing.line_art import line_settings
+from warpsplat.drawing.shapes import merge_near
+from warpsplat.drawing.strokes.ink import Ink
+from warpsplat.drawing.strokes.lines import trace_ink
+from warpsplat.drawing.strokes.ridges import FAINT, across, middles, with_thin
+from warpsplat.drawing.trace.grids import at_pixels
+from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.settings import Settings
+from warpsplat.portable import filters
+from warpsplat.portable.elementary import hypot
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene.scene import starts_of
+from warpsplat.svg.data import cubic_rows
+
+MARGIN = 3
+"""Clear pixels around a shape."""
+
+STEPS = 240
+"""Steps in which strokes are fitted to the shape."""
+
+OFF = 0.2
+"""Most by which the outlines of strokes are off in the mean [px]."""
+
+SPOT, SPOT_SIDE = 1.5, 5
+"""Area that differs in a square of some side [px], at most [px²]: at wide blunt ends more does."""
+
+LONG = 1.5
+"""Least length of what is no dot, over its width."""
+
+SLENDER = 17.0
+"""Square of the outline's length over the area of what may be strokes, at the least: a square has 16."""
+
+ALIKE, LEVEL, STRAIGHT = 0.4, 0.2, 0.15
+"""Differences of widths, of the ends of level lines, and of lines from curves, that do not count [px]."""
+
+Flags = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float64]
+
+
+def with_strokes(scene: Scene, settings: Settings, run: Run) -> Scene:
+    """Return a drawing with strokes in place of fills, or parts of them, of even width with round ends."""
+    may_be_drawn = (scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT)
+    done = scene.take(np.zeros(0, np.intp))
+    for i, is_flat in enumerate(may_be_drawn.tolist()):
+        shape = scene.take(np.array([i]))
+        done = done.append(_drawn(shape, settings, run) if is_flat and _is_slender(shape) else shape)
+    return replace(done, layer_names=scene.layer_names)
+
+
+def _is_slender(shape: Scene) -> bool:
+    """Return whether the outline of a shape is long for its area, about."""
+    length, area = 0.0, 0.0
+    for points, _ in shape.contours_of(0):
+        x, y = points.astype(np.float64).T
+        length += float(hypot(x - np.roll(x, 1), y - np.roll(y, 1)).sum())
+        area += float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum()) / 2
+    return length * length > SLENDER * abs(area)
+
+
+def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
+    """Return a fill as strokes, and what is left of it."""
+    low = np.floor(shape.points.min(axis=0)) - MARGIN
+    width, height = (np.ceil(shape.points.max(axis=0)) + MARGIN - low).astype(np.intp).tolist()
+    white, black = np.ones(3, np.float32), np.zeros((1, 3), np.float32)
+    canvas = replace(shape.canvas, width=width, height=height, background=white)
+    alone = replace(shape, canvas=canvas, points=shape.points - low.astype(np.float32))
+    solid = np.ones_like(shape.opacities)
+    shown = render(replace(alone, colors=black, opacities=solid), backend=run.backend)
+    cover = 1 - shown[..., 0]
+    mask = with_thin(cover > 0.5, middles(across(cover), FAINT))
+    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene
+    if not len(traced):
+        return shape
+    traced = replace(
+        traced, canvas=canvas, layer=np.zeros_like(traced.layer), colors=np.zeros_like(traced.colors)
+    )
+    quiet = replace(run, on_progress=None, checkpoint=None)
+    problem = Problem(shown, replace(line_settings(settings, len(traced)), iterations=STEPS))
+    strokes = _clean(fit(problem, quiet, Start(scene=traced)).scene)
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    # What a part covers of the pixels beside its mask belongs to it.
+    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
+    parts: IndexArray = np.asarray(grown, np.intp)
+    part, outline_part = _parts_of(parts, count, strokes), _parts_of(parts, count, alone)
+    lengths = _lengths(strokes)
+    pieces = (np.diff(strokes.starts) - 1 + strokes.closed) // 3
+    length: Floats = np.bincount(part, lengths, count).astype(np.float64)
+    area = np.bincount(part, lengths * strokes.widths, count)
+    curves = np.bincount(part, pieces, count)
+    before = np.bincount(outline_part, np.diff(alone.starts) // 3, count)
+    off = render(strokes, backend=run.backend)[..., 0] - shown[..., 0]
+    gone = _are_near(parts, off, length) & (length * length > LONG * area) & (curves <= before)
+    gone[0] = False
+    chosen = np.flatnonzero(gone[part])
+    if not len(chosen):
+        return shape
+    strokes = strokes.take(chosen)
+    strokes = replace(
+        strokes,
+        canvas=shape.canvas,
+        points=strokes.points + low.astype(np.float32),
+        colors=np.repeat(shape.colors, len(chosen), axis=0),
+        opacities=np.repeat(shape.opacities, len(chosen)),
+        layer=np.repeat(shape.layer, len(chosen)),
+    )
+    return _having(shape, ~gone[outline_part]).append(strokes)
+
+
+def _clean(strokes: Scene) -> Scene:
+    """Return fitted strokes with equal widths, and with straight and level lines where they nearly are."""
+    lengths = _lengths(strokes)
+    widths, _ = merge_near(strokes.widths.astype(np.float64), lengths / lengths.mean(), ALIKE * ALIKE / 2)
+    points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
+    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
+    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
+    near_line = np.maximum(*across) < STRAIGHT * np.maximum(hypot(*chord.T), 1e-9)
+    first, last = rows[near_line][:, [0, 3]].T
+    for axis in (0, 1):
+        near = np.abs(points[first, axis] - points[last, axis]) < LEVEL
+        mean = (points[first[near], axis] + points[last[near], axis]) / 2
+        points[first[near], axis] = points[last[near], axis] = mean
+    a, b = points[first], points[last]
+    points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
+    return replace(strokes, points=points.astype(np.float32), widths=widths.astype(np.float32))
+
+
+def _lengths(strokes: Scene) -> Floats:
+    """Return the lengths of the control polygons of strokes [px], shape (stroke,)."""
+    steps = np.append(hypot(*np.diff(strokes.points.astype(np.float64), axis=0).T), 0.0)
+    steps[strokes.first[1:] - 1] = 0
+    return np.asarray(np.add.reduceat(steps, strokes.first[:-1]))
+
+
+def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:
+    """Return the part, of ``count``, that most points of each contour are in, shape (contour,)."""
+    contours = len(scene.starts) - 1
+    owner = np.repeat(np.arange(contours), np.diff(scene.starts))
+    votes = np.bincount(owner * count + at_pixels(parts, scene.points), minlength=contours * count)
+    votes = votes.reshape(contours, count)
+    votes[:, 0] = 0
+    return votes.argmax(axis=1)
+
+
+def _are_near(parts: IndexArray, off: FloatArray, length: Floats) -> Flags:
+    """Return which parts of a shape strokes cover alike, shape (part,).
+
+    Args:
+        parts: The part of each pixel.
+        off: What strokes cover of each pixel less than the shape.
+        length: Of the strokes of each part [px].
+    """
+    worst = np.zeros(len(length))
+    np.maximum.at(worst, parts.ravel(), np.abs(filters.box_sum(off, SPOT_SIDE)).ravel().astype(np.float64))
+    away = np.bincount(parts.ravel(), np.abs(off).ravel(), len(length))
+    return np.asarray((worst <= SPOT) & (away <= 2 * OFF * length), np.bool_)
+
+
+def _having(shape: Scene, chosen: Flags) -> Scene:
+    """Return a shape with the ``chosen`` contours; none if there are none."""
+    counts = np.diff(shape.starts)
+    points = shape.points[np.repeat(chosen, counts)]
+    if not len(points):
+        return shape.take(np.zeros(0, np.intp))
+    first = np.array([0, len(points)], shape.first.dtype)
+    starts = starts_of(counts[chosen])
+    return replace(shape, points=points, first=first, starts=starts, closed=shape.closed[chosen])

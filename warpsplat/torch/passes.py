@@ -1,0 +1,82 @@
+"""Forward and backward passes by the engines, on tensors without history."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import torch
+
+from warpsplat.scene.attributes import OPACITY_RANGE
+from warpsplat.torch.engine import RenderSpec, engine_of, is_capturing, known
+from warpsplat.torch.tensors import not_finite
+
+Tensor = torch.Tensor
+
+tickets = itertools.count(1)
+"""Numbers of forward passes, by which a backward pass recognises its own in an engine."""
+
+
+class Pass(NamedTuple):
+    """A forward pass."""
+
+    image: Tensor
+    """Shape (height, width, 4)."""
+    spec: RenderSpec
+    """As examined."""
+    ticket: int
+
+    def state(self) -> Tensor:
+        """Return what ``restored`` needs, for those that can only keep tensors; int64, shape (2,)."""
+        return torch.tensor([self.ticket, self.spec.opaque], dtype=torch.int64)
+
+
+def restored(spec: RenderSpec, state: Tensor) -> tuple[RenderSpec, int]:
+    """Return the examined specification and the ticket of a pass with ``spec`` that had this ``state``."""
+    ticket, opaque = state.tolist()
+    return replace(spec, opaque=bool(opaque)), ticket
+
+
+def examined(spec: RenderSpec, values: Mapping[str, Tensor]) -> RenderSpec:
+    """Return ``spec`` with ``opaque``; unless that is known already, check that all values are finite.
+
+    While a CUDA graph is captured nothing can be read back, and nothing is checked; see ``known``.
+    """
+    if spec.opaque is not None:
+        return spec
+    if is_capturing(spec.device):
+        return known(spec)
+    each = [value.isfinite().all() for value in values.values()]
+    if "opacities" in values:
+        each.append((values["opacities"] > OPACITY_RANGE[1]).any())
+    found = torch.stack(each).tolist()  # one transfer from the device
+    opaque = "opacities" in values and found.pop()
+    if not all(found):
+        raise not_finite(name for name, fine in zip(values, found, strict=True) if not fine)
+    return replace(spec, opaque=opaque)
+
+
+def forward(spec: RenderSpec, values: Mapping[str, Tensor]) -> Pass:
+    """Render all attributes that the shapes have, by name, in float32; see ``examined``."""
+    spec = examined(spec, values)
+    shape = spec.viewport.height, spec.viewport.width, 4
+    image = torch.empty(shape, dtype=torch.float32, device=spec.device)
+    ticket = next(tickets)
+    with engine_of(spec) as engine:
+        engine.forward(values)
+        engine.show(image)
+        engine.ticket = ticket
+    return Pass(image, spec, ticket)
+
+
+def backward(
+    spec: RenderSpec, ticket: int, values: Mapping[str, Tensor], image_grad: Tensor, wanted: Sequence[str]
+) -> dict[str, Tensor]:
+    """Return the gradients of the attributes ``wanted`` for that of an image, in the shapes of ``values``."""
+    with engine_of(spec) as engine:
+        if engine.ticket != ticket:  # another call has used the buffers since
+            engine.forward(values)
+        found = engine.backward(image_grad.contiguous(), wanted)
+    return {name: gradient.reshape(values[name].shape) for name, gradient in found.items()}
