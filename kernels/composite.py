@@ -35,15 +35,16 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
 
     Args:
         column: type of its vectors of pixels.
-        painted: whether there may be gradients and pictures, or a transparent canvas.
+        painted: whether there may be gradients and pictures, or a transparent canvas; if ``straight``, where
+            all canvases are transparent, whether there may be gradients and pictures.
         straight: whether the colours are to be straight, not premultiplied, as in DiffVG: the mean over the
             pixel's area of the colours, black where nothing is. That is colour / opacity x hit; hit, the part
             of the pixel that shapes lie on, is the sum of their coverages, at most 1, which compositing
             underestimates where shapes meet.
     """
     skips_cached = not straight
-    painted = painted or straight
-    name = "straight_forward" if straight else "paint_forward" if painted else "composite_forward"
+    transparent = painted or straight
+    name = f"{'straight_' * straight}{'paint_' * painted}forward" if transparent else "composite_forward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def forward(
@@ -123,7 +124,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
                 image[tile, 0, x] = red + background[0] * transmittance
                 image[tile, 1, x] = green + background[1] * transmittance
                 image[tile, 2, x] = blue + background[2] * transmittance
-            if painted:
+            if transparent:
                 if image.shape[1] == 4:
                     image[tile, 3, x] = column(1.0) - transmittance
 

@@ -57,13 +57,12 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
 
     Args:
         column: type of its vectors of pixels.
-        painted: whether there may be gradients and pictures, or a transparent canvas.
-        straight: whether the colours are straight, see ``composite.make_forward``; then the gradient of hit
+        painted: see ``composite.make_forward``.
+        straight: whether the colours are straight, see there; then the gradient of hit
             is added to that of each coverage.
     """
-    painted = painted or straight
     single_lane = column is tile_column
-    name = "straight_backward" if straight else "opaque_paint_backward" if painted else "opaque_backward"
+    name = f"{'straight' if straight else 'opaque'}_{'paint_' * painted}backward"
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
     def backward(
@@ -139,9 +138,9 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                 covered = wp.abs(signed)
                 opacity = wp.abs(paint[3])
                 own = covered
+                painted_opacity = one
                 if painted:
                     gradient = paint[3] < 0.0
-                    painted_opacity = one
                     against = opaque
                     if gradient:
                         painted_opacity = paint_columns[slot, 3, x]
@@ -153,6 +152,8 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                     own = wp.cw_mul(covered, painted_opacity)
                 else:
                     against = paint_against(paint, red, green, blue)
+                    if straight:
+                        against = opaque + against
                 transmittance = transmittances[k, lane]
                 alpha = opacity * own
                 difference = against - behind

@@ -28,6 +28,7 @@ EXCEPTIONS = {
     "portable/filters.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "drawing/trace/assign.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "motion/preview.py": "cv2.resize",  # a preview
+    "forms/frame.py": ".dot",  # Warp's, in kernels
 }
 """Forbidden calls that a file may make, and why."""
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests import needs
 from tests.fit.pictures import picture, step_for, steps_of_all_kinds
 from tests.helpers import relative_error
 from tests.kernels.modules import all_kernels
@@ -53,9 +54,12 @@ NOT_IN_STEPS = {
     *("removal_cost", "visibility", "lane_sums"),
     *("tiles_to_pixels", "pixels_to_tiles"),
     *("opaque_backward", "opaque_paint_backward", "straight_forward", "straight_backward"),
+    *("straight_paint_forward", "straight_paint_backward"),
     *("along", "curvature", "errors", "errors_elsewhere", "handles_through", "nearest", "slopes", "solve"),
 }
 """Kernels that run between steps, in passes of ``warpsplat.torch``, or for drawings, on the host."""
+
+NOT_IN_STEPS |= set() if "pydiffvg" in needs.MISSING else {"nearest_points"}
 
 SEVERAL_LANES = {"sum_slots", "sum_lanes"}
 """Kernels for tiles that several threads share."""

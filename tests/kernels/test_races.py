@@ -71,7 +71,8 @@ def opaque_results() -> Iterator[Arrays]:
     """Render opaque shapes; yield gradients."""
     plain = mixed_scene(seed=1)
     painted = replace(with_gradients(mixed_scene(seed=2)), canvas=Canvas(40, 36, None))
-    for scene, straight in ((plain, False), (painted, False), (painted, True)):
+    clear = replace(plain, canvas=painted.canvas)
+    for scene, straight in ((plain, False), (painted, False), (clear, True), (painted, True)):
         renderer = renderer_for(scene, "cpu", threads=THREADS, opaque=True, straight=straight)
         renderer.write_image_grad(np.random.default_rng(0).normal(size=renderer.read_image().shape))
         renderer.backward()
@@ -99,12 +100,27 @@ def torch_results() -> Iterator[Arrays]:
     yield [image.detach().numpy(), *(v.grad.numpy() for v in tensors.values.values() if v.grad is not None)]
 
 
+def distance_results() -> Iterator[Arrays]:
+    """Compute distances from a scene of DiffVG's; yield them."""
+    import torch
+
+    from tests.pydiffvg.helpers import scene
+    from warpsplat.pydiffvg.arguments import serialize
+    from warpsplat.pydiffvg.distance import distances
+
+    arguments = serialize(48, 48, *scene(), torch.device("cpu"))
+    positions = torch.tensor(np.random.default_rng(0).uniform(0, 48, (99, 2)), dtype=torch.float32)
+    yield [distances(arguments, positions, THREADS).numpy()]
+
+
 def results(tracer: Tracer) -> list[Arrays]:
     """Launch every kernel; return what comes out."""
     with tracing(tracer):
         found = [*step_results(), *opaque_results(), *drawing_results()]
         if "torch" not in needs.MISSING:
             found += torch_results()
+        if "pydiffvg" not in needs.MISSING:
+            found += distance_results()
     return found
 
 

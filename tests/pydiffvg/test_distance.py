@@ -126,19 +126,20 @@ def test_gradients_are_those_of_differences(name: str) -> None:
     inputs = [values, MATRIX, POSITIONS]
     weights = torch.rand(len(POSITIONS), generator=generator)
 
-    def loss(v: Tensor, matrix: Tensor, positions: Tensor) -> Tensor:
+    def loss(given: Sequence[Tensor]) -> Tensor:
+        v, matrix, positions = given
         group = pydiffvg.ShapeGroup(torch.tensor([0]), tensor(1, 0, 0, 1), shape_to_canvas=matrix)
         return (weights * signed([shape(v)], [group], positions)[:, 0]).double().sum()
 
     leaves = [each.clone().requires_grad_() for each in inputs]
-    gradients = torch.autograd.grad(loss(*leaves), leaves)
+    gradients = torch.autograd.grad(loss(leaves), leaves)
     for i, gradient in enumerate(gradients):
         direction = torch.randn(inputs[i].shape, generator=generator)
         if inputs[i] is MATRIX:
             direction *= tensor([[0.02, 0.02, 1], [0.02, 0.02, 1], [0, 0, 0]])
         step = 0.005 * direction
         with torch.no_grad():
-            ahead, behind = (loss(*inputs[:i], inputs[i] + s * step, *inputs[i + 1 :]) for s in (1, -1))
+            ahead, behind = (loss([*inputs[:i], inputs[i] + s * step, *inputs[i + 1 :]]) for s in (1, -1))
         found = float((gradient * direction).sum())
         assert found == pytest.approx(
             float(ahead - behind) / 0.01, rel=0.01, abs=0.01 * float(gradient.norm())

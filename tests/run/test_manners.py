@@ -38,7 +38,8 @@ def test_results_of_equal_runs_are_equal(results: list[warpsplat.Result]) -> Non
     one, same, other = results
     assert one == same != other
     assert len({one, same, other}) == 2
-    assert one != "another thing"
+    anything: object = "another thing"
+    assert one != anything
     assert replace(one, render_psnr=math.nan) == replace(same, render_psnr=math.nan)
 
 
@@ -102,7 +103,14 @@ def test_every_element_that_draws_is_counted(shape: str) -> None:
 
 DESCRIBED = (
     *(warpsplat.Result, LevelScore, warpsplat.Score, warpsplat.Progress, warpsplat.Snapshot),
-    *(warpsplat.Expected, warpsplat.Suggestion, warpsplat.Scene, warpsplat.Canvas, Picture),
+    *(
+        warpsplat.Expected,
+        warpsplat.Suggestion,
+        warpsplat.Scene,
+        warpsplat.Canvas,
+        Picture,
+        warpsplat.CustomLoss,
+    ),
 )
 
 

@@ -59,7 +59,7 @@ def test_gradients_on_borders_are_those_of_differences(tmp_path: Path, name: str
     tensors = SceneTensors.of(warpsplat.load_svg(path))
 
     def loss(values: Tensor, name: str) -> Tensor:
-        changed = SceneTensors(tensors.layout, tensors.values | {name: values})
+        changed = SceneTensors(tensors.layout, {**tensors.values, name: values})
         return weighted(render(changed))
 
     for attribute in ("points", "widths") if "stroke" in shape else ("points",):

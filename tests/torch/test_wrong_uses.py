@@ -75,9 +75,9 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (UsageError, "width must be a whole number from 1 to .*, not 64.5", drawn(width=64.5)),
     (UsageError, "40x72 px do not have the proportions of 40x36", drawn(width=40, height=72)),
     (UsageError, "scenes of several sizes or devices", lambda: render([SCENE, LARGE])),
-    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: render(LARGE, 30_000)),
-    (ResourceError, "30000x27000 px would take about 38.9 GB", lambda: warpsplat.render(LARGE, 30_000)),
-    (ResourceError, "would take about .* GB, memory for it is", lambda: render([LARGE] * 100, 20_000)),
+    (ResourceError, "300000x270000 px would take about 3888.0 GB", lambda: render(LARGE, 300_000)),
+    (ResourceError, "300000x270000 px would take about 3888.0 GB", lambda: warpsplat.render(LARGE, 300_000)),
+    (ResourceError, "would take about .* GB, memory for it is", lambda: render([LARGE] * 100, 100_000)),
     (ValueError, "a canvas of 0x64 px has no pixel", lambda: Canvas(0, 64, None)),
     # Options
     (UsageError, "renderer must be one of exact.*, not 'fast'", drawn(renderer="fast")),
@@ -87,21 +87,21 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (UsageError, "threads must be a whole number from 1, not -1", drawn(threads=-1)),
     # Things that are no scenes
     (UsageError, "no scene to render", lambda: render([])),
-    (TypeError, r"as in module\(\); render takes its tensors\(\)", lambda: render(Module(SPLINES))),  # type: ignore[arg-type]
-    (TypeError, "takes SceneTensors or a Scene, or a list of them, not str", lambda: render("<svg")),  # type: ignore[arg-type]
+    (TypeError, r"as in module\(\); render takes its tensors\(\)", lambda: render(Module(SPLINES))),
+    (TypeError, "takes SceneTensors or a Scene, or a list of them, not str", lambda: render("<svg")),
     (TypeError, "or a list of them, not int", lambda: render([SPLINES, 3])),  # type: ignore[list-item]
-    (TypeError, "not str: warpsplat.load_svg reads one", lambda: SceneTensors.of("<svg/>")),  # type: ignore[arg-type]
-    (TypeError, "the layout is a str, not a Scene", lambda: SceneTensors("<svg/>", {})),  # type: ignore[arg-type]
-    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: Module(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
-    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: warpsplat.save_svg(SceneTensors(SCENE, {}))),  # type: ignore[arg-type]
-    (TypeError, "a Scene is needed, not Result", lambda: warpsplat.save_svg(warpsplat.vectorize(PIXELS))),  # type: ignore[arg-type]
-    (TypeError, "is its text, a path, bytes or a file, not NoneType", lambda: warpsplat.render(None)),  # type: ignore[arg-type]
+    (TypeError, "not str: warpsplat.load_svg reads one", lambda: SceneTensors.of("<svg/>")),
+    (TypeError, "the layout is a str, not a Scene", lambda: SceneTensors("<svg/>", {})),
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: Module(SceneTensors(SCENE, {}))),
+    (TypeError, r"not SceneTensors: give its scene\(\)", lambda: warpsplat.save_svg(SceneTensors(SCENE, {}))),
+    (TypeError, "a Scene is needed, not Result", lambda: warpsplat.save_svg(warpsplat.vectorize(PIXELS))),
+    (TypeError, "is its text, a path, bytes or a file, not NoneType", lambda: warpsplat.render(None)),
     (ImageError, "the SVG: is empty: give an SVG's text", lambda: warpsplat.load_svg("")),
     (
         TypeError,
         "an image is a path, .* or an array, not Tensor",
         lambda: warpsplat.vectorize(torch.zeros(36, 40, 3)),
-    ),  # type: ignore[arg-type]
+    ),
 ]
 """Error, pattern of its message, use."""
 

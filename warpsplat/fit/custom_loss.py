@@ -12,6 +12,7 @@ import numpy as np
 
 from warpsplat.errors import UsageError, cause_of, shown
 from warpsplat.extensions import declared, load
+from warpsplat.field_docs import described
 from warpsplat.scene import FloatArray
 
 LossFunction = Callable[..., Any]
@@ -26,6 +27,7 @@ are then placed where it is large, else where the gradient is.
 """
 
 
+@described
 @dataclass(frozen=True)
 class CustomLoss:
     """A loss of your own, for ``vectorize`` and ``refine``."""

@@ -34,7 +34,7 @@ Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 LossName = Literal["l2", "ssim", "edges"]
 
-LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.02, "edges": 3.0}
+LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.005, "edges": 3.0}
 """Weights of what joins the squared error."""
 
 PRESETS: dict[Quality, dict[str, Any]] = {
@@ -310,7 +310,7 @@ class Settings:
     gaussian_density: float = research(0.5, "Soft Gaussians of a shape, over their usual number.", (0.05, 20))
     order: Order = research("age", "The newest shapes in front, or the smallest as in the paper.")
     loss_weight: float | None = research(
-        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.02 ssim, 3 edges"
+        None, "Weight of what `loss` adds to the squared error.", WEIGHT, shown_default="0.005 ssim, 3 edges"
     )
     texture: float = research(
         0.1, "Power of the local variance by which errors count less: textured areas mask them.", FRACTION

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -102,7 +103,8 @@ def _stream(device: torch.device) -> wp.Stream | None:
 @functools.lru_cache(maxsize=KEPT)
 def curves_of(structure: Structure, device: torch.device) -> Curves:
     """Return the curves of the scenes of a structure."""
-    parts, kinds, drawn, counts, entries = [NOTHING], [], [], [], []
+    parts, entries = [NOTHING], list[Sequence[int]]()
+    kinds, drawn, counts = list[int](), list[int](), list[int]()
     for group in structure.groups:
         before = len(kinds)
         for shape in group.shapes:
@@ -120,7 +122,10 @@ def curves_of(structure: Structure, device: torch.device) -> Curves:
     arrays = [np.array(each, np.int32) for each in (kinds, drawn, np.cumsum([0, *counts]), rules)]
     return Curves(
         Gather(combined(parts, np.concatenate), device),
-        *(on(each, device) for each in arrays),
+        on(arrays[0], device),
+        on(arrays[1], device),
+        on(arrays[2], device),
+        on(arrays[3], device),
         on(arrays[0] == kernels.ELLIPSE, device),
         indices(entries, device) if any(group.transform is not None for group in structure.groups) else None,
     )

@@ -31,7 +31,7 @@ class Concatenate(torch.autograd.Function):
         """Return the numbers, shape (number,); ``places``: of the tensors among them."""
         ctx.places = places
         constants = torch.tensor([0.0, 1.0], device=tensors[0].device)
-        return _flatten_dense_tensors((constants, *tensors))  # type: ignore[no-any-return]
+        return _flatten_dense_tensors((constants, *tensors))
 
     @staticmethod
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:

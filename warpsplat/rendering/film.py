@@ -68,8 +68,10 @@ class Film:
         self._bins, self._coverage, self._paint = bins, coverage, paint
 
     def _painted(self) -> bool:
-        """Return whether there is more than flat paints on a background, which have kernels of their own."""
-        return self.planes == 4 or not self._paint.is_flat
+        """Return whether there is more than flat paints, on a background unless colours are straight: these
+        have kernels of their own.
+        """
+        return (self.planes == 4 and not self._straight) or not self._paint.is_flat
 
     def _adjoint(self) -> wp.Kernel:
         """Return the adjoint of compositing."""

@@ -50,7 +50,7 @@ def relative(controls: wp.array2d[wp.vec2], j: wp.int32, kind: wp.int32, p: wp.v
 
 
 @wp.func
-def point_at(c: curve, kind: wp.int32, t: wp.float32) -> wp.vec2:
+def curve_point(c: curve, kind: wp.int32, t: wp.float32) -> wp.vec2:
     """Return q(t)."""
     if kind == ELLIPSE:
         turn = sine_and_cosine(FULL_TURN * t)
@@ -60,7 +60,7 @@ def point_at(c: curve, kind: wp.int32, t: wp.float32) -> wp.vec2:
 
 
 @wp.func
-def slope_at(c: curve, kind: wp.int32, t: wp.float32) -> wp.vec2:
+def curve_slope(c: curve, kind: wp.int32, t: wp.float32) -> wp.vec2:
     """Return q'(t)."""
     if kind == ELLIPSE:
         turn = sine_and_cosine(FULL_TURN * t)
@@ -74,11 +74,11 @@ def minimum(c: curve, kind: wp.int32, start: wp.float32, end: wp.float32) -> wp.
     """Return where the square of q, which falls at ``start`` and rises at ``end``, is least."""
     low = start
     high = end
-    f_low = wp.dot(point_at(c, kind, low), slope_at(c, kind, low))
-    f_high = wp.dot(point_at(c, kind, high), slope_at(c, kind, high))
+    f_low = wp.dot(curve_point(c, kind, low), curve_slope(c, kind, low))
+    f_high = wp.dot(curve_point(c, kind, high), curve_slope(c, kind, high))
     t = 0.5 * (low + high)
     for _ in range(STEPS):
-        f = wp.dot(point_at(c, kind, t), slope_at(c, kind, t))
+        f = wp.dot(curve_point(c, kind, t), curve_slope(c, kind, t))
         # The end that stays counts half, or it might stay for ever.
         if f < 0.0:
             low = t
@@ -108,18 +108,18 @@ def nearest_to_origin(c: curve, kind: wp.int32, least: wp.float32) -> wp.vec2:
         if wp.dot(q, q) < least:
             best = wp.vec2(t, wp.dot(q, q))
         return best
-    q = point_at(c, kind, 0.0)
-    rises = wp.dot(q, slope_at(c, kind, 0.0)) >= 0.0
+    q = curve_point(c, kind, 0.0)
+    rises = wp.dot(q, curve_slope(c, kind, 0.0)) >= 0.0
     if wp.dot(q, q) < best[1]:
         best = wp.vec2(0.0, wp.dot(q, q))
     for k in range(1, PIECES + 1):
         t = float(k) / float(PIECES)
-        q = point_at(c, kind, t)
+        q = curve_point(c, kind, t)
         fell = not rises
-        rises = wp.dot(q, slope_at(c, kind, t)) >= 0.0
+        rises = wp.dot(q, curve_slope(c, kind, t)) >= 0.0
         if fell and rises:
             t = minimum(c, kind, t - 1.0 / float(PIECES), t)
-            q = point_at(c, kind, t)
+            q = curve_point(c, kind, t)
         if wp.dot(q, q) < best[1]:
             best = wp.vec2(t, wp.dot(q, q))
     return best
@@ -156,11 +156,11 @@ def winding_of_piece(
     high = end
     for _ in range(BISECTIONS):
         t = 0.5 * (low + high)
-        if (point_at(c, CUBIC, t)[1] <= 0.0) == (y0 <= 0.0):
+        if (curve_point(c, CUBIC, t)[1] <= 0.0) == (y0 <= 0.0):
             low = t
         else:
             high = t
-    if point_at(c, CUBIC, 0.5 * (low + high))[0] >= 0.0:
+    if curve_point(c, CUBIC, 0.5 * (low + high))[0] >= 0.0:
         return 0
     return wp.where(y1 > y0, 1, -1)
 
@@ -189,7 +189,7 @@ def winding_of(c: curve, kind: wp.int32) -> wp.int32:
         t1 = wp.where(k == 0, wp.min(first, second), wp.where(k == 1, wp.max(first, second), 1.0))
         y1 = c[1, 3]
         if t1 < 1.0:
-            y1 = point_at(c, CUBIC, t1)[1]
+            y1 = curve_point(c, CUBIC, t1)[1]
         found += winding_of_piece(c, t0, t1, y0, y1)
         t0 = t1
         y0 = y1
