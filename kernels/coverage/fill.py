@@ -35,7 +35,7 @@ MARGIN = wp.constant(constants.TILE_MARGIN)
 BESIDE = wp.constant(1.0e-3)  # [px] distance from an edge at which winding numbers are those beside it
 BORDER_TOLERANCE = wp.constant(1.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
 ROUNDING = wp.constant(2.4e-7)  # of coordinates
-NOT_ALONG = wp.constant(0.02)  # [px] an edge that goes so far across lies on no border: most end the test here
+NOT_ALONG = wp.constant(0.02)  # [px] an edge whose ends differ more lies on no border: most are told by this
 
 
 @wp.func
