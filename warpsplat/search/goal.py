@@ -214,7 +214,8 @@ def next_change(tried: list[Candidate], settings: Settings) -> Change | None:
         return None
     large = [candidate for candidate in tried if not _fits(candidate, settings)]
     if large:
-        base = min(large, key=lambda candidate: candidate.size)
+        # A change may make a file no smaller; made of the same base again, the next one would be the same.
+        base = tried[-1] if tried[-1] in large else min(large, key=lambda candidate: candidate.size)
         return Change(base, max(AIM_FULL * limit, CUT_MOST * base.size), base.fit.per_pixel)
     return _growth(max(tried, key=lambda candidate: candidate.size), settings)
 
