@@ -72,7 +72,7 @@ class Finished(NamedTuple):
     per_pixel: float
     """View box units per pixel."""
     psnr: float = math.nan
-    """Of the exact render before it is rounded [dB]; NaN if it was not fitted."""
+    """PSNR of the exact render before it is rounded [dB]; NaN if it was not fitted."""
 
 
 def finish_drawing(

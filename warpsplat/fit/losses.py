@@ -62,9 +62,9 @@ class LossTarget:
         self.squared_error = custom.squared_error if custom else 1.0
         """Weight of the squared error."""
         self.evaluation: Evaluation | None = None
-        """Of ``custom``, at the last render."""
+        """Result of ``custom`` at the last render."""
         self._shift: FloatArray | float = 0.0
-        """What a viewer shows - the render, by which ``assign`` has replaced the target."""
+        """Difference of what a viewer shows from the render; ``assign`` has subtracted it from the target."""
         self.target: wp.array = backend.columns_of(to_tiles(target))
         self.weighted = importance is not None
         weights = np.ones(target.shape[:2], np.float32) if importance is None else importance

@@ -1,4 +1,4 @@
-"""What a fit judges shapes by between steps: the loss of a render, where it is large, what a change costs.
+"""The loss by which shapes are judged between steps: its value, where it is large, what a change costs.
 
 The squared error is quadratic in the image, so that what it costs to remove a shape, to recolour it or to
 paint it with a gradient follows from the target and the pixels' weights. Any other loss is replaced by the
@@ -39,7 +39,7 @@ class Quadratic:
     target: wp.array
     """By tiles, as the film's image."""
     weights: wp.array
-    """Of the pixels, 0 outside the image, by tiles, as the film's ``inside``."""
+    """Weights of the pixels, 0 outside the image, by tiles, as the film's ``inside``."""
 
     def pixel_weights(self) -> FloatArray:
         """Return the weights of the pixels, shape (tile, TILE, TILE)."""

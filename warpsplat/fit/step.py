@@ -114,7 +114,7 @@ class Step:
         record_adam(update, state.parameters, state.clock, self.settings)
         compare = losses.image_program(inputs)
         self.objective = Objective(inputs, compare)
-        """What judges shapes between steps."""
+        """Judges shapes between steps."""
         target = self._level_target
         levels = [replace(inputs, renderer=renderer, target=target) for renderer in self.level_renderers]
         self.programs: tuple[Program, ...] = (

@@ -20,7 +20,7 @@ Array = npt.NDArray[Any]
 
 
 class Form(Protocol):
-    """What the module of a form has. Arrays of values have shape (shape, value, 2)."""
+    """Interface of the module of a form. Arrays of values have shape (shape, value, 2)."""
 
     VALUES: int
     """Number of values; 0: any, as vertices."""

@@ -142,7 +142,7 @@ class OptimizableSvg:
             shapes = sum(bool(element.paths) for element in elements)
             print(f"{path}: {len(elements)} elements, {shapes} of them shapes")
         self.scene: tuple[int, int, list[Shape], list[ShapeGroup]] | None = None
-        """What ``build_scene`` last returned."""
+        """Last result of ``build_scene``."""
         self.background = torch.ones(3, device=self.device)
         """sRGB, shape (3,)."""
         self._optimizers = [optimizer for element in elements for optimizer in element.optimizers]

@@ -50,7 +50,7 @@ class OutputType(IntEnum):
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """What ``serialize_scene`` was told besides the scene."""
+    """Arguments of ``serialize_scene`` besides the scene."""
 
     filter: PixelFilter
     output_type: OutputType

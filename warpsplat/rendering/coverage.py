@@ -9,6 +9,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.coverage import fill
+from warpsplat.kernels.coverage.fill_backward import fill_backward
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.outline import Outline
@@ -115,7 +116,7 @@ class ExactCoverage:
                 shapes, lines = self._inputs.parameters.shape_count, self._outline.buffers
                 program.launch(stroke.widths_backward, shapes, arrays, lines, self._inputs.viewport)
             else:
-                self._launch(program, part, fill.fill_backward, edges, own_part=part, sum_grad=gradient)
+                self._launch(program, part, fill_backward, edges, own_part=part, sum_grad=gradient)
         if self._outline.stroker:
             self._outline.stroker.backward(program)
         self._outline.backward(program)

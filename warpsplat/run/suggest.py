@@ -62,7 +62,7 @@ class Expected:
     shapes: int
     """Their number."""
     psnr: float
-    """Of the file as a viewer shows it [dB]."""
+    """PSNR of the file as a viewer shows it [dB]."""
     bytes: int
     """Size of the file."""
 

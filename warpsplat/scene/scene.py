@@ -94,7 +94,7 @@ class Scene:
     """
 
     canvas: Canvas
-    """What the shapes lie on."""
+    """Canvas that the shapes lie on."""
     kind: IntArray
     """``Kind`` of each shape, shape (shape,)."""
     first: IntArray
