@@ -26,6 +26,7 @@ MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices s
 MARGIN = wp.constant(constants.TILE_MARGIN)
 BORDER_TOLERANCE = wp.constant(1.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
 ROUNDING = wp.constant(2.4e-7)  # of coordinates
+MOST_VERTICES = wp.constant(512)  # of a shape whose edges may lie on borders
 NOT_ALONG = wp.constant(0.02)  # [px] an edge whose ends differ more lies on no border: most are told by this
 
 
@@ -72,6 +73,12 @@ def on_border(a: wp.float32, b: wp.float32) -> wp.bool:
     return wp.max(wp.abs(a - border), wp.abs(b - border)) <= tolerance
 
 
+@wp.func
+def has_borders(first: wp.int32, last: wp.int32) -> wp.bool:
+    """Return whether edges of a shape with these vertices may lie on borders: winding numbers take all."""
+    return last - first <= MOST_VERTICES
+
+
 @wp.kernel
 def fill_states(
     # In:
@@ -111,13 +118,14 @@ def fill_states(
         slot_state[s] = 0
         slot_winding[s] = 0
     winding = int(0)
+    borders = has_borders(vertex_first[shape], vertex_last[shape])
     for j in range(vertex_first[shape], vertex_last[shape]):
         a = vertex[j]
         b = vertex[vertex_next[j]]
         lowest = wp.min(a[1], b[1])
         highest = wp.max(a[1], b[1])
         level = bool(False)
-        if lowest <= high + MARGIN and highest >= low - MARGIN:
+        if borders and lowest <= high + MARGIN and highest >= low - MARGIN:
             level = on_border(a[1], b[1])
         if level or (lowest <= high and highest >= low):
             turn = crossing(a, b, low + MIDDLE)
@@ -132,7 +140,7 @@ def fill_states(
             if not level:
                 ends = cut_to_row(a, b, low, high)
             state = int(constants.PARTIAL)
-            if level or on_border(a[0], b[0]):
+            if level or (borders and on_border(a[0], b[0])):
                 state = constants.PARTIAL + constants.ALIGNED
             s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
             s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)

@@ -11,7 +11,7 @@ taken from the winding numbers beside each edge of slots with such an edge (ALIG
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage.fill import crossing, is_partial, on_border
+from warpsplat.kernels.coverage.fill import crossing, has_borders, is_partial, on_border
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -215,7 +215,7 @@ def fill_backward(
         sums = wp.vec2(0.0, 0.0)
         vertices = wp.vec2i(vertex_first[shape], vertex_last[shape])
         along = wp.where(is_upright(d), 0, 1)
-        if on_border(start[along], start[along] + d[along]):
+        if has_borders(vertices[0], vertices[1]) and on_border(start[along], start[along] + d[along]):
             size = wp.vec2i(wide, high)
             sums = sums_along_border(
                 sum_grad,
