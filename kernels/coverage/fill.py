@@ -26,7 +26,7 @@ MIDDLE = wp.constant(7.73)  # of a row of tiles [px]: a line on which vertices s
 MARGIN = wp.constant(constants.TILE_MARGIN)
 BORDER_TOLERANCE = wp.constant(1.0e-5)  # [px] an edge that is so near to a border of pixels lies on it
 ROUNDING = wp.constant(2.4e-7)  # of coordinates
-MOST_VERTICES = wp.constant(512)  # of a shape whose edges may lie on borders
+MOST_VERTICES = wp.constant(512)  # of a shape whose edges on borders of pixels are treated apart
 NOT_ALONG = wp.constant(0.02)  # [px] an edge whose ends differ more lies on no border: most are told by this
 
 
@@ -75,7 +75,10 @@ def on_border(a: wp.float32, b: wp.float32) -> wp.bool:
 
 @wp.func
 def has_borders(first: wp.int32, last: wp.int32) -> wp.bool:
-    """Return whether edges of a shape with these vertices may lie on borders: winding numbers take all."""
+    """Return whether a shape has few enough vertices for the treatment of edges on borders of pixels.
+
+    Winding numbers beside such an edge take a pass over all of the shape's edges.
+    """
     return last - first <= MOST_VERTICES
 
 

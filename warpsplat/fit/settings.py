@@ -280,7 +280,7 @@ class Settings:
     )
     strokes: bool = option(
         False,
-        "Of drawings: what a round pen draws in even width becomes strokes; drafts have none.",
+        "In drawings, lines of even width with round ends become strokes; drafts have none.",
     )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
