@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,10 @@ SCENE, SPLINES, LARGE = (
 PIXELS = np.zeros((36, 40, 3))
 
 
+# The default type of torch is that of the references while tests are collected.
+zeros, ones, full = (partial(make, dtype=torch.float32) for make in (torch.zeros, torch.ones, torch.full))
+
+
 def drawn(**options: Any) -> Callable[[], object]:
     return lambda: render(SceneTensors(SPLINES, {}), **options)
 
@@ -42,31 +47,31 @@ def twice() -> None:
 
 WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     # Values
-    (ValueError, "no attribute 'colour'; there are points, ", valued(colour=torch.zeros(4))),
-    (ValueError, r"colors has shape \(3,\), not \(4, 3\)", valued(colors=torch.zeros(3))),
-    (TypeError, "colors is torch.float16, not torch.float32", valued(colors=torch.zeros(4, 3).half())),
+    (ValueError, "no attribute 'colour'; there are points, ", valued(colour=zeros(4))),
+    (ValueError, r"colors has shape \(3,\), not \(4, 3\)", valued(colors=zeros(3))),
+    (TypeError, "colors is torch.float16, not torch.float32", valued(colors=zeros(4, 3).half())),
     (
         TypeError,
         "colors is torch.int64, not torch.float32",
         valued(colors=torch.zeros(4, 3, dtype=torch.int64)),
     ),
     (TypeError, "colors is a ndarray, not a torch.Tensor", valued(colors=np.zeros((4, 3), np.float32))),
-    (ValueError, "^colors: numbers that are not finite", valued(colors=torch.full((4, 3), torch.nan))),
+    (ValueError, "^colors: numbers that are not finite", valued(colors=full((4, 3), torch.nan))),
     (
         ValueError,
         "^points: numbers that are not finite",
         valued(points=torch.tensor(SCENE.points) + torch.inf),
     ),
-    (ValueError, "focus has no gradient here", valued(focus=torch.zeros(4, 3, requires_grad=True))),
+    (ValueError, "focus has no gradient here", valued(focus=zeros(4, 3, requires_grad=True))),
     (
         ValueError,
         "colors is on meta",
-        valued(opacities=torch.ones(4), colors=torch.zeros(4, 3, device="meta")),
+        valued(opacities=ones(4), colors=zeros(4, 3, device="meta")),
     ),
     (
         UsageError,
         "tensors are on meta, neither on the CPU nor on CUDA",
-        valued(opacities=torch.ones(4, device="meta")),
+        valued(opacities=ones(4, device="meta")),
     ),
     (RuntimeError, "differentiate twice", twice),
     # Sizes
@@ -100,7 +105,7 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (
         TypeError,
         "an image is a path, .* or an array, not Tensor",
-        lambda: warpsplat.vectorize(torch.zeros(36, 40, 3)),
+        lambda: warpsplat.vectorize(zeros(36, 40, 3)),
     ),
 ]
 """Error, pattern of its message, use."""
