@@ -15,13 +15,21 @@ from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
-from warpsplat.drawing.trace.order import Tree, bare_ground, find_ranks, find_tree, has_inside
+from warpsplat.drawing.trace.order import (
+    Tree,
+    bare_ground,
+    enclosed,
+    find_ranks,
+    find_tree,
+    has_inside,
+    in_holes_with,
+)
 from warpsplat.drawing.trace.outlines import Boundary, find_boundary
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import Layers, Outline, find_outlines
+from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
@@ -81,12 +89,14 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     unpainted, ground = _ground(regions, tree, may_have_ground=may_have_ground)
     sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
     ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
-    outlines = _outlines(flat, loops, boundary, tree, ranks)
+    layers = _layers(flat, loops, boundary, tree, ranks)
+    outlines = find_outlines(layers)
     for depth in range(1, int(nesting.depth.max()) + 1):
         layer = replace(regions, labels=nesting.shown(depth)[regions.labels])
-        inner = find_loops(layer.labels, layer.image)
-        drawn = _outlines(layer, inner, find_boundary(inner, layer), find_tree(inner, count), ranks)
-        outlines += [(region, outline) for region, outline in drawn if nesting.depth[region] == depth]
+        inner = find_loops(layer.labels, layer.image, nesting.depth == depth)
+        # Bands hide nothing, so that the cover is the same at all depths.
+        layers = replace(layers, loops=inner, boundary=find_boundary(inner, layer), has_holes=True)
+        outlines += find_outlines(layers)
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
     fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
     found = [
@@ -108,14 +118,16 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     return _scene(Canvas(width, height, background), merged(shapes))
 
 
-def _outlines(
-    regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints
-) -> list[tuple[int, Outline]]:
-    """Return the contours of regions, which lie on one another by their ranks."""
+def _layers(regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
+    """Return regions as they lie on one another by their ranks."""
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
+    holed = has_inside(tree, ~is_opaque)
+    # Something transparent may lie between regions as well as inside one; what reaches the border of the
+    # image is not between them.
+    has_holes = bool(enclosed(loops, holed).any())
     cover = Cover(hiding[regions.labels])
-    return find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
+    return Layers(loops, boundary, ranks, hiding, cover, in_holes_with(loops, holed), has_holes)
 
 
 TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve
