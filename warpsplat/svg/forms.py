@@ -43,6 +43,8 @@ def gradient_frames(scene: Scene, per_pixel: float) -> Points:
     frames = (scene.frames.astype(np.float64) * per_pixel).reshape(-1, 3, 2)
     for group in scene.alike():
         if group.basis.is_form and form_of(group.basis.name).TURNED:
+            from warpsplat.forms.frame import turned_back  # imports Warp
+
             degrees = form_of(group.basis.name).numbers(group.points.astype(np.float64) * per_pixel)[:, -1]
             from warpsplat.forms.frame import turned_back  # with kernels, which drafts do without
 
