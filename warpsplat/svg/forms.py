@@ -46,8 +46,6 @@ def gradient_frames(scene: Scene, per_pixel: float) -> Points:
             from warpsplat.forms.frame import turned_back  # imports Warp
 
             degrees = form_of(group.basis.name).numbers(group.points.astype(np.float64) * per_pixel)[:, -1]
-            from warpsplat.forms.frame import turned_back  # with kernels, which drafts do without
-
             for row in range(3):
                 frames[group.shapes, row] = turned_back(frames[group.shapes, row], degrees)
     return frames
