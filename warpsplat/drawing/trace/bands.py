@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -47,13 +48,16 @@ class _Piece:
         return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
 
 
-def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
+def split_uneven(
+    image: Floats, parts: Parts, noise: float, check: Callable[[], None] = lambda: None
+) -> Parts:
     """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
 
     Args:
         image: premultiplied, 0..255, shape (height, width, 4).
         parts: of the image.
         noise: of flat regions [levels].
+        check: as for ``trace``.
     """
     waiting = _uneven(image, parts, UNEVEN + noise)
     if not waiting:
@@ -65,6 +69,7 @@ def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
     done: list[_Piece] = []
     made = len(queue)
     while queue and made < MOST_BANDS:
+        check()
         _, _, piece = heapq.heappop(queue)
         halves = _halves(image, piece)
         gain = piece.error - sum(half.error for half in halves)

@@ -28,6 +28,7 @@ NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
 SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
 WEIGHT = 256  # that stands for 1 where weights are whole numbers
+SPECK = 0.5  # [px] area
 SWEEPS = 4  # in which sub-pixels change places
 MOST_FRAYED = 1.4
 """Most length of the borders of sub-pixels, over that of the borders of pixels. Where an image is blurred,
@@ -65,12 +66,23 @@ def with_sub_pixels(regions: Regions) -> Regions:
     small = _mapped(painted, mixed, scale)
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
+    _remove_specks(small, mixed, colors, scale)
     fills = colors[small]
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = small
     return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
+
+
+def _remove_specks(small: Ints, mixed: _Mixed, colors: Floats, scale: int) -> None:
+    """Give parts too small to be seen, which thin tips leave, to the other colour of their pixels."""
+    labels = components(small, colors[small])
+    is_speck = np.bincount(labels.ravel()) < SPECK * scale**2
+    place = np.arange(scale)
+    at = mixed.rows[:, None, None] * scale + place[:, None], mixed.columns[:, None, None] * scale + place
+    other = (mixed.first + mixed.second)[:, None, None] - small[at]
+    small[at] = np.where(is_speck[labels[at]], other, small[at])
 
 
 def _border(labels: Ints) -> int:
