@@ -1,7 +1,7 @@
 """Loss of an image's edges with its gradient: the squared error of both slopes by Sobel's 3x3 filters.
 
-A vector of pixels is smoothed and differentiated from top to bottom first, then together with the vectors on
-both sides. Outside of the image there is no error.
+A thread goes over vectors of pixels from left to right. Each is smoothed and differentiated from top to
+bottom, once, and then combined with the two before it. Outside of the image there is no error.
 """
 
 import functools
@@ -53,8 +53,8 @@ def raised(v: quad, last: wp.float32):  # noqa: F811
 
 @wp.func
 def beside(tile: wp.int32, p: wp.int32, step: wp.int32, tiles_x: wp.int32, parts: wp.int32):
-    """Return the tile and place of the vector to the left (-1) or right (1); tile -1: outside of the image.
-    ``parts``: vectors in a column of a tile.
+    """Return the tile and place of the vector ``step`` to the right of ``p``, at most one beyond the tile;
+    tile -1: outside of the image. ``parts``: vectors in a column of a tile.
     """
     t = tile
     q = p + step * parts
@@ -89,7 +89,7 @@ def make_edge_slopes(column: Any) -> wp.Kernel:
     def edge_slopes(
         # In:
         offset: wp.int32,
-        lane_columns: wp.int32,  # vectors of a tile that a thread handles
+        lane_columns: wp.int32,  # vectors of a tile that a thread handles: one, or columns side by side
         image: wp.array3d[column],  # [tile_count, planes, columns]
         target: wp.array3d[column],  # [tile_count, planes, columns]
         inside: wp.array2d[column],  # [tile_count, columns] 1 in the image, 0 outside
@@ -108,37 +108,47 @@ def make_edge_slopes(column: Any) -> wp.Kernel:
         """
         i, plane, lane = wp.tid()
         tile = offset + i
+        start = lane * lane_columns
         squares = column(0.0)
         factor = 2.0 * edge_weight / float(value_count)
-        for p in range(lane * lane_columns, (lane + 1) * lane_columns):
-            across = column(0.0)
-            down = column(0.0)
-            for side in range(-1, 2):
-                at = wp.vec2i(tile, p)
-                if side != 0:
-                    at = beside(tile, p, side, tiles_x, parts)
-                if at[0] >= 0:
-                    t = at[0]
-                    q = at[1]
-                    e = wp.cw_mul(inside[t, q], image[t, plane, q] - target[t, plane, q])
-                    first = float(0.0)
-                    last = float(0.0)
-                    up = beyond(t, q, -1, tiles_x, parts, tile_count)
-                    if up[0] >= 0:
-                        first = image[up[0], plane, up[1]][end] - target[up[0], plane, up[1]][end]
-                        first *= inside[up[0], up[1]][end]
-                    low = beyond(t, q, 1, tiles_x, parts, tile_count)
-                    if low[0] >= 0:
-                        last = image[low[0], plane, low[1]][0] - target[low[0], plane, low[1]][0]
-                        last *= inside[low[0], low[1]][0]
-                    above = lowered(first, e)
-                    under = raised(e, last)
-                    across = across + (0.125 * float(side)) * (above + 2.0 * e + under)
-                    down = down + (0.125 * float(2 - wp.abs(side))) * (under - above)
-            weight = importance[tile, p]
-            squares = squares + wp.cw_mul(weight, wp.cw_mul(across, across) + wp.cw_mul(down, down))
-            across_grad[tile, plane, p] = factor * wp.cw_mul(weight, across)
-            down_grad[tile, plane, p] = factor * wp.cw_mul(weight, down)
+        smooth = column(0.0)  # of the last vector and the one before it, and likewise
+        smooth_before = column(0.0)
+        steps = column(0.0)
+        steps_before = column(0.0)
+        for k in range(-1, lane_columns + 1):
+            smooth_right = column(0.0)
+            steps_right = column(0.0)
+            at = beside(tile, start, k, tiles_x, parts)
+            if at[0] >= 0:
+                t = at[0]
+                q = at[1]
+                first = float(0.0)
+                last = float(0.0)
+                up = beyond(t, q, -1, tiles_x, parts, tile_count)
+                if up[0] >= 0:
+                    first = image[up[0], plane, up[1]][end] - target[up[0], plane, up[1]][end]
+                    first *= inside[up[0], up[1]][end]
+                low = beyond(t, q, 1, tiles_x, parts, tile_count)
+                if low[0] >= 0:
+                    last = image[low[0], plane, low[1]][0] - target[low[0], plane, low[1]][0]
+                    last *= inside[low[0], low[1]][0]
+                e = wp.cw_mul(inside[t, q], image[t, plane, q] - target[t, plane, q])
+                above = lowered(first, e)
+                under = raised(e, last)
+                smooth_right = above + 2.0 * e + under
+                steps_right = under - above
+            if k > 0:
+                p = start + k - 1
+                across = 0.125 * (smooth_right - smooth_before)
+                down = 0.125 * (steps_before + 2.0 * steps + steps_right)
+                weight = importance[tile, p]
+                squares = squares + wp.cw_mul(weight, wp.cw_mul(across, across) + wp.cw_mul(down, down))
+                across_grad[tile, plane, p] = factor * wp.cw_mul(weight, across)
+                down_grad[tile, plane, p] = factor * wp.cw_mul(weight, down)
+            smooth_before = smooth
+            smooth = smooth_right
+            steps_before = steps
+            steps = steps_right
         edges[tile, plane, lane] = edge_weight * total(squares)
 
     return edge_slopes
@@ -154,7 +164,7 @@ def make_edge_backward(column: Any) -> wp.Kernel:
     def edge_backward(
         # In:
         offset: wp.int32,
-        lane_columns: wp.int32,  # vectors of a tile that a thread handles
+        lane_columns: wp.int32,  # vectors of a tile that a thread handles: one, or columns side by side
         across_grad: wp.array3d[column],  # [tile_count, planes, columns] 0 outside of the image
         down_grad: wp.array3d[column],  # [tile_count, planes, columns] 0 outside of the image
         inside: wp.array2d[column],  # [tile_count, columns] 1 in the image, 0 outside
@@ -168,33 +178,37 @@ def make_edge_backward(column: Any) -> wp.Kernel:
         """
         i, plane, lane = wp.tid()
         tile = offset + i
-        for p in range(lane * lane_columns, (lane + 1) * lane_columns):
-            grad = column(0.0)
-            for side in range(-1, 2):
-                at = wp.vec2i(tile, p)
-                if side != 0:
-                    at = beside(tile, p, side, tiles_x, parts)
-                if at[0] >= 0:
-                    t = at[0]
-                    q = at[1]
-                    a = across_grad[t, plane, q]
-                    d = down_grad[t, plane, q]
-                    first_a = float(0.0)
-                    first_d = float(0.0)
-                    up = beyond(t, q, -1, tiles_x, parts, tile_count)
-                    if up[0] >= 0:
-                        first_a = across_grad[up[0], plane, up[1]][end]
-                        first_d = down_grad[up[0], plane, up[1]][end]
-                    last_a = float(0.0)
-                    last_d = float(0.0)
-                    low = beyond(t, q, 1, tiles_x, parts, tile_count)
-                    if low[0] >= 0:
-                        last_a = across_grad[low[0], plane, low[1]][0]
-                        last_d = down_grad[low[0], plane, low[1]][0]
-                    smooth = lowered(first_a, a) + 2.0 * a + raised(a, last_a)
-                    grad = grad - (0.125 * float(side)) * smooth
-                    steps = raised(d, last_d) - lowered(first_d, d)
-                    grad = grad - (0.125 * float(2 - wp.abs(side))) * steps
-            image_grad[tile, plane, p] = image_grad[tile, plane, p] + wp.cw_mul(inside[tile, p], grad)
+        start = lane * lane_columns
+        left = column(0.0)  # what the gradient of the last vector has by now
+        middle = column(0.0)  # what that of the next one has
+        for k in range(-1, lane_columns + 1):
+            smooth = column(0.0)
+            steps = column(0.0)
+            at = beside(tile, start, k, tiles_x, parts)
+            if at[0] >= 0:
+                t = at[0]
+                q = at[1]
+                first_a = float(0.0)
+                first_d = float(0.0)
+                up = beyond(t, q, -1, tiles_x, parts, tile_count)
+                if up[0] >= 0:
+                    first_a = across_grad[up[0], plane, up[1]][end]
+                    first_d = down_grad[up[0], plane, up[1]][end]
+                last_a = float(0.0)
+                last_d = float(0.0)
+                low = beyond(t, q, 1, tiles_x, parts, tile_count)
+                if low[0] >= 0:
+                    last_a = across_grad[low[0], plane, low[1]][0]
+                    last_d = down_grad[low[0], plane, low[1]][0]
+                a = across_grad[t, plane, q]
+                d = down_grad[t, plane, q]
+                smooth = lowered(first_a, a) + 2.0 * a + raised(a, last_a)
+                steps = raised(d, last_d) - lowered(first_d, d)
+            if k > 0:
+                p = start + k - 1
+                grad = 0.125 * wp.cw_mul(inside[tile, p], left - steps - smooth)
+                image_grad[tile, plane, p] = image_grad[tile, plane, p] + grad
+            left = middle - 2.0 * steps
+            middle = smooth - steps
 
     return edge_backward

@@ -12,7 +12,7 @@ import warp as wp
 
 import warpsplat
 from tests.fit.pictures import picture, step_for
-from tests.scenes import FORMS, forms_scene, mixed_scene, random_scene
+from tests.scenes import FORMS, forms_scene, mixed_scene, random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.forms import form_of
@@ -112,6 +112,15 @@ def test_elements_are_rounded_once_and_come_back(per_pixel: float, seed: int) ->
     np.testing.assert_allclose(render(read), render(scene), atol=0.02)
     assert write_svg(rounded(read, per_pixel), per_pixel=per_pixel) == text
     assert not load_kept(text, 80, 72, "a.svg").scene.forms(), "curves, unless asked"
+
+
+def test_gradients_of_turned_elements() -> None:
+    """The file shows what the scene does, as it does where outlines are curves."""
+    scene = with_gradients(forms_scene(64, 48))
+    images = [
+        score_svg(write_svg(each, per_pixel=100.0), render(scene)).psnr for each in (scene, scene.drawn())
+    ]
+    assert images[0] > images[1] - 0.1
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.custom_loss import uses_torch
 from warpsplat.fit.export import export, shown_image
 from warpsplat.fit.rounding import evaluate_file
+from warpsplat.fit.schedule import CHECK_INTERVAL
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
@@ -132,6 +133,20 @@ def test_a_loss_falls_further_than_without_it(device: str) -> None:
     assert values[1] < 0.8 * values[0], "over five seeds 0.21 to 0.59 times"
 
 
+@pytest.mark.parametrize(("given", "begun"), [((), 28), ((1.0,), 0), ((0.0, True, False, 0.2), 12)])
+def test_when_a_loss_begins(given: tuple[Any, ...], begun: int) -> None:
+    """One that replaces the squared error is evaluated once before half of the steps, for its faults."""
+    progress, seen = [0], list[int]()
+
+    def watching(image: FloatArray, target: FloatArray = PICTURE) -> Both:
+        seen.append(progress[-1])
+        return squared(image, target)
+
+    fitted(CustomLoss(watching, *given), callback=lambda made: progress.append(made.step))
+    early = [step for step in seen if step + CHECK_INTERVAL <= begun]
+    assert len(early) == (begun > 0) and len(seen) >= 56 - begun
+
+
 OPTIONS: dict[str, dict[str, Any]] = {
     "transparent": {"image": CLEAR},
     "layered": {"curves": None, "levels": (4, 12), "iterations": 28},
@@ -220,13 +235,16 @@ def test_declarations_are_checked() -> None:
         CustomLoss(3)
     with pytest.raises(UsageError, match="squared_error must be a number from 0, not -1"):
         CustomLoss(slopes, -1)
+    with pytest.raises(UsageError, match="begin must be a number from 0 to 1, not 2"):
+        CustomLoss(slopes, begin=2)
 
 
 def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
-    loss, path = CustomLoss(slopes, 0.1, with_target=True), tmp_path / "run.checkpoint"
+    """Also where the loss begins, in the middle of the run."""
+    loss, path = CustomLoss(slopes, 0.1, with_target=True, begin=0.5), tmp_path / "run.checkpoint"
     whole = fitted(loss, colors=4)
     steps = itertools.count(1)
-    assert fitted(loss, colors=4, checkpoint=path, stop=lambda: next(steps) >= 30).stopped
+    assert fitted(loss, colors=4, checkpoint=path, stop=lambda: next(steps) >= 28).stopped
     with pytest.raises(UsageError, match="loss differs"):
         fitted(CustomLoss(slopes, with_target=True), colors=4, checkpoint=path, resume=True)
     assert fitted(loss, colors=4, checkpoint=path, resume=True).svg == whole.svg

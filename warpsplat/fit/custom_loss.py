@@ -27,6 +27,10 @@ are then placed where it is large, else where the gradient is.
 """
 
 
+BEGIN = 0.5
+"""``CustomLoss.begin`` of losses that replace the squared error."""
+
+
 @described
 @dataclass(frozen=True)
 class CustomLoss:
@@ -42,20 +46,31 @@ class CustomLoss:
     """Whether the function is one of torch; None: it is if it is a module of torch, or its source file
     imports torch.
     """
+    begin: float | None = None
+    """Share of the steps of ``vectorize`` before which the squared error alone counts; None: 0 if the loss
+    joins it, half if the loss replaces it, as few losses lead shapes to their places from afar.
+    """
 
     def __post_init__(self) -> None:
         """Check the types."""
         if not callable(self.function):
             raise UsageError(f"a loss is a function of a render, not {shown(self.function)}")
-        weight = self.squared_error
-        if isinstance(weight, bool) or not isinstance(weight, (int, float)) or not 0 <= weight < np.inf:
-            raise UsageError(f"squared_error must be a number from 0, not {shown(weight)}")
+        if not _is_number(self.squared_error):
+            raise UsageError(f"squared_error must be a number from 0, not {shown(self.squared_error)}")
+        if self.begin is not None and not (_is_number(self.begin) and self.begin <= 1):
+            raise UsageError(f"begin must be a number from 0 to 1, not {shown(self.begin)}")
+
+    def counts_at(self, progress: float) -> bool:
+        """Return whether the loss counts after a share of the steps."""
+        begin = BEGIN if self.begin is None and not self.squared_error else self.begin
+        return progress >= (begin or 0)
 
     @property
     def name(self) -> str:
         """Its name, by which a checkpoint knows it."""
         found = self.function if hasattr(self.function, "__qualname__") else type(self.function)
-        return f"{found.__module__}.{found.__qualname__} + {self.squared_error:g} l2"
+        begin = "" if self.begin is None else f" from {self.begin:g}"
+        return f"{found.__module__}.{found.__qualname__} + {self.squared_error:g} l2{begin}"
 
     def on(self, device: str) -> LossFunction:
         """Return the function of arrays that returns a value and a gradient, as NumPy has them.
@@ -91,6 +106,11 @@ def _package(value: object) -> str:
         return value.__name__.partition(".")[0]
     kind = value if isinstance(value, (type, FunctionType)) else type(value)
     return kind.__module__.partition(".")[0]
+
+
+def _is_number(value: object) -> bool:
+    """Return whether a value is a finite number from 0."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < np.inf
 
 
 class Evaluation(NamedTuple):

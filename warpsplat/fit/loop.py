@@ -10,6 +10,7 @@ import numpy as np
 
 from warpsplat.fit.budget import Budget, affordable
 from warpsplat.fit.checkpoint import Content, number
+from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.densification import densify, recover, remove_surplus
 from warpsplat.fit.importance import pixel_weights
 from warpsplat.fit.palette import Palette
@@ -147,13 +148,21 @@ class _Training:
             self.budget = Budget(self.run.deadline)
             settings = self.budget.measure(state, settings, self.image, self.loss)
         self.started = time.monotonic()
+        if self.loss_at(settings, begin) is not self.loss:  # let its faults end the run now
+            Step(state, settings, Target(self.image, self.plan[0], loss=self.loss)).measured_error()
         step = Step(state, settings, self.target(settings, begin))
         self.step = densify(step, grows=True) if self.start.below is not None else step
         self.advance()
 
     def target(self, settings: Settings, step: int) -> Target:
         """Return what the step after ``step`` steps is compared with."""
-        return Target(self.image, phase_at(settings, self.plan, step), self.weights, self.loss)
+        phase, loss = phase_at(settings, self.plan, step), self.loss_at(settings, step)
+        return Target(self.image, phase, self.weights, loss)
+
+    def loss_at(self, settings: Settings, step: int) -> CustomLoss | None:
+        """Return the user's own loss if it counts after ``step`` steps; if shapes were given, it does."""
+        counts = self.loss and (not self.grows or self.loss.counts_at(step / settings.iterations))
+        return self.loss if counts else None
 
     def is_over(self) -> bool:
         """Return whether there is no further step."""
@@ -164,7 +173,10 @@ class _Training:
         """Make a step, and report it where that is due."""
         step, settings = self.step, self.step.settings
         state = step.state
-        if phase_at(settings, self.plan, state.step) is not step.target.phase:
+        begins = self.loss_at(settings, state.step) is not step.target.loss
+        if begins:  # moments have another scale
+            state.parameters.rearrange(np.arange(0), state.scene())
+        if begins or phase_at(settings, self.plan, state.step) is not step.target.phase:
             self.step = step = Step(state, settings, self.target(settings, state.step))
         if self.palette and not state.rounding and self.palette.is_due(state):
             self.palette.choose(step)

@@ -26,6 +26,8 @@ class Form(Protocol):
     """Number of values; 0: any, as vertices."""
     TAGS: tuple[str, ...]
     """SVG elements that are read as this form."""
+    TURNED: bool
+    """Whether elements are turned, by the last of their numbers [degrees] about the origin."""
     place: wp.Kernel
     """Values -> control points, see ``kernels.forms``."""
     gather: wp.Kernel

@@ -12,6 +12,7 @@ from warpsplat.kernels.forms import make_gather, make_place
 
 VALUES = 2
 TAGS = ("circle",)
+TURNED = False
 
 AROUND = table_of(QUARTERS)
 

@@ -9,6 +9,7 @@ from warpsplat.forms.text import element_of
 
 VALUES = 3
 TAGS = ("ellipse",)
+TURNED = True
 
 
 def drawn(count: int, closed: bool) -> int:

@@ -12,6 +12,7 @@ from warpsplat.portable import elementary
 
 VALUES = 0
 TAGS = ("polygon", "polyline", "line")
+TURNED = False
 
 
 def drawn(count: int, closed: bool) -> int:

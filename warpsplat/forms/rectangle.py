@@ -10,6 +10,7 @@ from warpsplat.forms.text import element_of
 
 VALUES = 3
 TAGS = ("rect",)
+TURNED = True
 
 SQUARE = sides(np.array([[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]]), True)[0]
 """Control points of the square of half side 1."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from warpsplat.forms import form_of
+from warpsplat.forms.frame import turned_back
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.svg.paths import Points
 
@@ -36,6 +37,17 @@ def form_elements(scene: Scene, per_pixel: float) -> dict[int, str]:
             elements = [form.element(own, group.closed) for own in numbers]
             found.update(zip(group.shapes.tolist(), elements, strict=True))
     return found
+
+
+def gradient_frames(scene: Scene, per_pixel: float) -> Points:
+    """Return the frames of gradients in the coordinates of the shapes' elements, shape (shape, 3, 2)."""
+    frames = (scene.frames.astype(np.float64) * per_pixel).reshape(-1, 3, 2)
+    for group in scene.alike():
+        if group.basis.is_form and form_of(group.basis.name).TURNED:
+            degrees = form_of(group.basis.name).numbers(group.points.astype(np.float64) * per_pixel)[:, -1]
+            for row in range(3):
+                frames[group.shapes, row] = turned_back(frames[group.shapes, row], degrees)
+    return frames
 
 
 def read_form(tag: str, points: Points, closed: bool) -> tuple[Basis, Points] | None:

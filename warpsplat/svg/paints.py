@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import GRADIENTS, Paint, Scene, Spread
+from warpsplat.svg.forms import gradient_frames
 from warpsplat.svg.numbers import hex_colors, number
 
 Floats = npt.NDArray[np.float64]
@@ -30,8 +31,10 @@ def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]
     elements: dict[str, str] = {}
     owners = {}
     prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
-    for shape in np.flatnonzero(np.isin(scene.paint, GRADIENTS)).tolist():
-        body = _gradient(scene, shape, per_pixel)
+    painted = np.flatnonzero(np.isin(scene.paint, GRADIENTS)).tolist()
+    frames = gradient_frames(scene, per_pixel) if painted else []
+    for shape in painted:
+        body = _gradient(scene, shape, frames[shape], per_pixel)
         owners[shape] = elements.setdefault(body, f"{prefix}{len(elements)}")
     texts = [body.replace(" ", f' id="{name}" ', 1) for body, name in elements.items()]
     return texts, owners
@@ -45,10 +48,9 @@ def unused(prefix: str, text: str) -> str:
     return prefix
 
 
-def _gradient(scene: Scene, shape: int, per_pixel: float) -> str:
+def _gradient(scene: Scene, shape: int, frame: Floats, per_pixel: float) -> str:
     """Return a shape's gradient element, without its identifier."""
-    frame = scene.frames[shape].astype(np.float64) * per_pixel
-    origin, axes = frame[:2], frame[2:].reshape(2, 2)
+    origin, axes = frame[0], frame[1:]
     # Ramps lie on whole units, as outlines do.
     decimals = 0 if per_pixel >= 1 and scene.spread[shape] == Spread.PAD else PLACE_DECIMALS
     if scene.paint[shape] == Paint.LINEAR:
