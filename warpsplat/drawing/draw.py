@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from functools import partial
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.chroma import finish_by_lightness
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import (
     as_fit,
@@ -18,7 +20,7 @@ from warpsplat.drawing.draft import (
     trace_in_time,
 )
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
-from warpsplat.drawing.tidy import Finished, finish_drawing
+from warpsplat.drawing.tidy import Finished
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -51,7 +53,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
     finish = partial(
-        finish_drawing,
+        finish_by_lightness,
         original(problem.target),
         finest=finest(settings),
         price=byte_price(settings),
@@ -111,7 +113,9 @@ def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     settings = problem.settings
     drawing, grid = trace_regions(wide, run, most), finest(settings)
     price = byte_price(settings)
-    done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price)
+    done = finish_by_lightness(
+        original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price
+    )
     made = _sketch(wide, run, done).fit
     return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
 
@@ -139,7 +143,7 @@ def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
 
         scene = with_strokes(scene, problem.settings, run)
     per_pixel = done.per_pixel / size
-    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)):
+    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)) or math.isnan(done.psnr):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
         made = Fit(scene, per_pixel, done.psnr, done.psnr, 0, run.stopped())

@@ -20,10 +20,11 @@ from warpsplat.portable import elementary, filters
 
 SCALES = (4, 3, 2)
 MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
-FOREIGN_SHARE = 0.3  # of the mixed pixels that may be no mixtures of two colours
+FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
 MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
 SMALL = 64 * 64  # [px] of an image that is drawn by sub-pixels if any is thin
+FOREIGN_IN_SMALL = 0.3  # the largest foreign share there
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
 SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
@@ -59,9 +60,11 @@ def with_sub_pixels(regions: Regions) -> Regions:
     inked = with_inks(regions)
     colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
     painted, mixed = _unmixed(inked, colors)
-    thin = _thin_share(painted, mixed)
-    is_thin = thin >= THIN_SHARE or (height * width <= SMALL and thin > 0)
-    if not is_thin or _foreign_share(inked, mixed, colors) > FOREIGN_SHARE:
+    is_small = height * width <= SMALL
+    thin, foreign = _thin_share(painted, mixed), _foreign_share(inked, mixed, colors)
+    if not (thin > 0 if is_small else thin >= THIN_SHARE):
+        return regions
+    if foreign > (FOREIGN_IN_SMALL if is_small else FOREIGN_SHARE):
         return regions
     small = _mapped(painted, mixed, scale)
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
