@@ -31,9 +31,9 @@ LEAST_ORIGINAL_SIDE = 96
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
 
-TRACE_SHARE, QUICK_PIXELS = 0.6, 131_072
+TRACE_SHARE, QUICK_PIXELS, QUICK_SECONDS = 0.75, 131_072, 1.0
 """Share of the time left that a trace may take before one of fewer pixels begins, and the pixels of the last,
-which is not given up: it takes less than a second."""
+which is not given up, and the time that is left for it [s]."""
 
 DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
@@ -90,9 +90,10 @@ def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: 
         return replace(found, scene=enlarged(found.scene, factor, width, height))
 
     least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))
+    early = run.derived(deadline=run.deadline - QUICK_SECONDS)
     for factor in range(1, min(least, 3)):
         with contextlib.suppress(Stopped):
-            return traced(factor, run.within(TRACE_SHARE).check)
+            return traced(factor, early.within(TRACE_SHARE).check)
     return traced(least, unchecked)
 
 
