@@ -114,6 +114,9 @@ ALIGNED = 8
 TILE_MARGIN = 0.01
 """Distance [px] from a tile at which an edge of a fill counts as touching it."""
 
+EDGE_BLOCK = 32
+"""Edges in a row whose heights are known together: rows of tiles beyond them leave them out."""
+
 NEARLY_NONE = 1.0e-20
 NEARLY_ALL = 1.0 - 2.0**-24
 """Coverages that show as 0 and 1 but have a gradient, where an edge on a border of pixels may change them."""

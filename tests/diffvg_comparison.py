@@ -58,6 +58,7 @@ def counts(*values: int) -> Tensor:
 
 
 BLOB = tensor([[10.3, 26.1], [13.2, 5.4], [46.8, 8.3], [52.7, 29.2], [55.1, 52.6], [16.4, 57.3]])
+KNOT = tensor([[6.3, 50.2], [70.4, 2.3], [-6.2, 3.1], [57.7, 53.4]])
 WAVE = tensor([[8.2, 40.4], [20.6, 4.3], [36.1, 60.2], [56.4, 20.7]])
 STAR = tensor([[32.2, 6.1], [16.4, 56.3], [57.1, 24.2], [6.6, 25.4], [47.3, 55.8]])
 RED, BLUE = tensor(0.8, 0.3, 0.2, 0.9), tensor(0.2, 0.3, 0.8, 0.6)
@@ -72,9 +73,35 @@ def closed(pd: ModuleType, t: Tensors, **more: Any) -> tuple[list[Any], list[Any
     return [shape], [pd.ShapeGroup(first(), t.get("color"), **more)]
 
 
-def stroked(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+def stroked(pd: ModuleType, t: Tensors, **more: Any) -> tuple[list[Any], list[Any]]:
     shape = pd.Path(counts(2), t["points"], False, stroke_width=t["width"])
+    return [shape], [pd.ShapeGroup(first(), None, stroke_color=t.get("color"), **more)]
+
+
+def strokes(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+    numbers = range(len(t) // 3)
+    shapes = [pd.Path(counts(2), t[f"points {i}"], False, stroke_width=t[f"width {i}"]) for i in numbers]
+    return shapes, [pd.ShapeGroup(counts(i), None, stroke_color=t[f"color {i}"]) for i in numbers]
+
+
+def polyline(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+    shape = pd.Polygon(t["points"], False, stroke_width=t["width"])
     return [shape], [pd.ShapeGroup(first(), None, stroke_color=t["color"])]
+
+
+def loop(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+    shape = pd.Path(counts(2, 2), t["points"], True, stroke_width=t["width"])
+    return [shape], [pd.ShapeGroup(first(), None, stroke_color=t["color"])]
+
+
+def mixed(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+    """A closed path of a cubic, a quadratic and a line."""
+    return [pd.Path(counts(2, 1, 0), t["points"], True)], [pd.ShapeGroup(first(), t["color"])]
+
+
+def circles(pd: ModuleType, t: Tensors) -> tuple[list[Any], list[Any]]:
+    shapes = [pd.Circle(t[f"radius {i}"], t[f"center {i}"]) for i in range(2)]
+    return shapes, [pd.ShapeGroup(counts(0, 1), t["color"], use_even_odd_rule=True)]
 
 
 def painted(pd: ModuleType, t: Tensors, kind: str) -> tuple[list[Any], list[Any]]:
@@ -131,6 +158,38 @@ CASES: dict[str, Case] = {
     "open stroke": Case({"points": WAVE, "width": tensor(2.4), "color": RED}, stroked),
     "thin stroke": Case({"points": WAVE, "width": tensor(0.5), "color": RED}, stroked),
     "tapered stroke": Case({"points": WAVE, "width": tensor(1.2, 3.1, 2.3, 4.2), "color": RED}, stroked),
+    "strokes of 0.3 to 2 px": Case(
+        {
+            name: value
+            for i, width in enumerate((0.15, 0.3, 0.6, 1.0))
+            for name, value in (
+                (f"points {i}", WAVE + tensor(0, 5.3 * (i - 1.6))),
+                (f"width {i}", tensor(width)),
+                (f"color {i}", RED if i % 2 else BLUE),
+            )
+        },
+        strokes,
+    ),
+    "stroke over itself": Case(
+        {"points": KNOT, "width": tensor(4.4), "color": tensor(0.8, 0.3, 0.2, 0.5)}, stroked
+    ),
+    "rotated stroke": Case(
+        {"points": WAVE, "width": tensor(2.4), "color": RED, "matrix": TURNED},
+        lambda pd, t: stroked(pd, t, shape_to_canvas=t["matrix"]),
+    ),
+    "stroke of a polyline": Case({"points": STAR, "width": tensor(1.4), "color": RED}, polyline),
+    "stroke around a path": Case({"points": BLOB, "width": tensor(1.8), "color": BLUE}, loop),
+    "cubic, quadratic, line": Case({"points": BLOB, "color": RED}, mixed),
+    "two circles, even-odd": Case(
+        {
+            "radius 0": tensor(17.3),
+            "center 0": tensor(26.2, 30.7),
+            "radius 1": tensor(13.4),
+            "center 1": tensor(41.3, 36.2),
+            "color": RED,
+        },
+        circles,
+    ),
     "linear gradient": Case({"points": BLOB, **PAINT}, lambda pd, t: painted(pd, t, "LinearGradient")),
     "radial gradient": Case({"points": BLOB, **PAINT}, lambda pd, t: painted(pd, t, "RadialGradient")),
     "star, even-odd": Case({"points": STAR, "color": RED}, lambda pd, t: star(pd, t, True)),

@@ -1,8 +1,10 @@
 """Print what passes cost through PyTorch and through DiffVG's interface: ``python -m tests.overheads``.
 
 CPU time of a forward and a backward pass, of the renderer itself, of ``warpsplat.torch``, and of
-``warpsplat.pydiffvg`` with ``serialize_scene``, alternately on the scenes of ``warpsplat bench``. The tables
-are those of docs/benchmarks.md. On a busy machine with two threads, torch's own wait for each other.
+``warpsplat.pydiffvg`` with ``serialize_scene``, alternately on the scenes of ``warpsplat bench``; and of a
+function of torch that only copies pydiffvg's tensors into one and splits its gradient: the least that so
+many tensors cost. The tables are those of docs/benchmarks.md. On a busy machine with two threads, torch's
+own wait for each other.
 """
 
 from __future__ import annotations
@@ -11,16 +13,18 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
 import warp as wp
+from torch._utils import _flatten_dense_tensors, _unflatten_dense_tensors
 
 from warpsplat import pydiffvg
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Renderer
-from warpsplat.scene import Kind, Scene
+from warpsplat.scene import Kind, Rule, Scene
 from warpsplat.tools.bench import WARM_UP, bench_scene, passes_of
 from warpsplat.torch import SceneTensors, render
 
@@ -53,9 +57,21 @@ def torch_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callab
     return run
 
 
-def pydiffvg_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callable[[], None]:
-    """Return the passes through ``warpsplat.pydiffvg``; each shape has tensors of its own."""
-    del threads  # as many as torch uses
+class Copy(torch.autograd.Function):
+    """Tensors -> their numbers."""
+
+    @staticmethod
+    def forward(ctx: Any, *tensors: torch.Tensor) -> torch.Tensor:
+        ctx.like = tensors
+        return _flatten_dense_tensors(tensors)
+
+    @staticmethod
+    def backward(ctx: Any, grad: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return tuple(_unflatten_dense_tensors(grad, ctx.like))
+
+
+def diffvg_scene(scene: Scene) -> tuple[list[pydiffvg.Path], list[pydiffvg.ShapeGroup], list[torch.Tensor]]:
+    """Return shapes and groups, with tensors of their own, and those that require gradients."""
     shapes: list[pydiffvg.Path] = []
     groups: list[pydiffvg.ShapeGroup] = []
     leaves: list[torch.Tensor] = []
@@ -67,8 +83,26 @@ def pydiffvg_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Cal
         counts = torch.full((len(points) // 3,), 2, dtype=torch.int32)
         shapes.append(pydiffvg.Path(counts, points, bool(is_fill), width))
         fill, stroke = (color, None) if is_fill else (None, color)
-        groups.append(pydiffvg.ShapeGroup(torch.tensor([i]), fill, stroke_color=stroke))
+        even_odd = scene.rule[i] == Rule.EVENODD
+        groups.append(pydiffvg.ShapeGroup(torch.tensor([i]), fill, even_odd, stroke_color=stroke))
         leaves += [points, color] if is_fill else [points, color, width]
+    return shapes, groups, leaves
+
+
+def leaf_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callable[[], None]:
+    """Return the passes of ``Copy`` on the tensors of ``pydiffvg_passes``."""
+    leaves = diffvg_scene(scene)[2]
+    grad = torch.ones(sum(map(torch.Tensor.numel, leaves)))
+
+    def run() -> None:
+        torch.autograd.grad(Copy.apply(*leaves), leaves, grad)
+
+    return run
+
+
+def pydiffvg_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callable[[], None]:
+    """Return the passes through ``warpsplat.pydiffvg``, which uses as many threads as torch."""
+    shapes, groups, leaves = diffvg_scene(scene)
     size = scene.canvas.width, scene.canvas.height
 
     def run() -> None:
@@ -80,10 +114,12 @@ def pydiffvg_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Cal
 
 
 def medians(kind: str, count: int, size: tuple[int, int], threads: int, repeats: int) -> list[float]:
-    """Return the median CPU time of each kind of passes [ms], and after it that over the renderer's own."""
+    """Return the median CPU time of each kind of passes [ms]."""
     scene = bench_scene(kind, count, size, 0.9, 0)
     image_grad = torch.rand(size[1], size[0], 4, generator=torch.Generator().manual_seed(0))
-    works = [make(scene, image_grad, threads) for make in (own_passes, torch_passes, pydiffvg_passes)]
+    works = [
+        make(scene, image_grad, threads) for make in (own_passes, torch_passes, pydiffvg_passes, leaf_passes)
+    ]
     times = np.zeros((repeats + WARM_UP, len(works)))
     for one in times:
         for i, work in enumerate(works):
@@ -100,15 +136,15 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=20)
     options = parser.parse_args()
     wp.config.log_level = wp.LOG_ERROR
-    print("| CPU ms a pass | threads | own | torch | ratio | pydiffvg | ratio |")
-    print("|---|---|---|---|---|---|---|")
+    print("| CPU ms a pass | threads | own | torch | ratio | pydiffvg | ratio | of it its tensors |")
+    print("|---|---|---|---|---|---|---|---|")
     for threads in options.threads:
         torch.set_num_threads(threads)
         for kind, count, size in SCENES:
-            own, through_torch, through_pydiffvg = medians(kind, count, size, threads, options.repeats)
+            own, torch_time, pydiffvg_time, leaves = medians(kind, count, size, threads, options.repeats)
             print(
-                f"| {count} {kind}, {size[0]}x{size[1]} | {threads} | {own:.1f} | {through_torch:.1f} | "
-                f"{through_torch / own:.2f} | {through_pydiffvg:.1f} | {through_pydiffvg / own:.2f} |",
+                f"| {count} {kind}, {size[0]}x{size[1]} | {threads} | {own:.1f} | {torch_time:.1f} | "
+                f"{torch_time / own:.2f} | {pydiffvg_time:.1f} | {pydiffvg_time / own:.2f} | {leaves:.1f} |",
                 flush=True,
             )
 

@@ -83,6 +83,32 @@ def has_borders(first: wp.int32, last: wp.int32) -> wp.bool:
 
 
 @wp.kernel
+def find_reach(
+    # In:
+    offset: wp.int32,
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    reach: wp.array[
+        wp.vec2
+    ],  # [vertex_capacity / EDGE_BLOCK] px; least and largest y of the edges of a block
+):
+    """Find between which heights the edges of each block lie. One thread a block."""
+    block = offset + wp.tid()
+    low = float(constants.REACH_MAX)
+    high = -float(constants.REACH_MAX)
+    first = constants.EDGE_BLOCK * block
+    for j in range(first, wp.min(first + constants.EDGE_BLOCK, vertex.shape[0])):
+        y = vertex[j][1]
+        end = y
+        if vertex_next[j] >= 0:
+            end = vertex[vertex_next[j]][1]
+        low = wp.min(low, wp.min(y, end))
+        high = wp.max(high, wp.max(y, end))
+    reach[block] = wp.vec2(low, high)
+
+
+@wp.kernel
 def fill_states(
     # In:
     offset: wp.int32,
@@ -96,6 +122,7 @@ def fill_states(
     vertex_last: wp.array[wp.int32],  # [shape_count]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    reach: wp.array[wp.vec2],  # [vertex_capacity / EDGE_BLOCK] px
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] UNCOVERED, PARTIAL, PARTIAL + ALIGNED or FULL
     slot_winding: wp.array[wp.int32],  # [slot_capacity] of slots that no edge touches
@@ -122,33 +149,40 @@ def fill_states(
         slot_winding[s] = 0
     winding = int(0)
     borders = has_borders(vertex_first[shape], vertex_last[shape])
-    for j in range(vertex_first[shape], vertex_last[shape]):
-        a = vertex[j]
-        b = vertex[vertex_next[j]]
-        lowest = wp.min(a[1], b[1])
-        highest = wp.max(a[1], b[1])
-        level = bool(False)
-        if borders and lowest <= high + MARGIN and highest >= low - MARGIN:
-            level = on_border(a[1], b[1])
-        if level or (lowest <= high and highest >= low):
-            turn = crossing(a, b, low + MIDDLE)
-            if turn != 0:
-                slope = (b[0] - a[0]) / (b[1] - a[1])
-                s = slot + tile_of(a[0] + slope * (low + MIDDLE - a[1]) - left, wide)
-                if s < slot:
-                    winding += turn
-                elif s < end:
-                    slot_winding[s] = slot_winding[s] + turn
-            ends = wp.vec2(a[0], b[0])
-            if not level:
-                ends = cut_to_row(a, b, low, high)
-            state = int(constants.PARTIAL)
-            if level or (borders and on_border(a[0], b[0])):
-                state = constants.PARTIAL + constants.ALIGNED
-            s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
-            s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)
-            for s in range(s0, s1 + 1):
-                slot_state[s] = slot_state[s] | state
+    last = vertex_last[shape]
+    first = vertex_first[shape]
+    while first < last:
+        block = first / constants.EDGE_BLOCK
+        stop = wp.min(constants.EDGE_BLOCK * (block + 1), last)
+        if reach[block][0] <= high + MARGIN and reach[block][1] >= low - MARGIN:
+            for j in range(first, stop):
+                a = vertex[j]
+                b = vertex[vertex_next[j]]
+                lowest = wp.min(a[1], b[1])
+                highest = wp.max(a[1], b[1])
+                level = bool(False)
+                if borders and lowest <= high + MARGIN and highest >= low - MARGIN:
+                    level = on_border(a[1], b[1])
+                if level or (lowest <= high and highest >= low):
+                    turn = crossing(a, b, low + MIDDLE)
+                    if turn != 0:
+                        slope = (b[0] - a[0]) / (b[1] - a[1])
+                        s = slot + tile_of(a[0] + slope * (low + MIDDLE - a[1]) - left, wide)
+                        if s < slot:
+                            winding += turn
+                        elif s < end:
+                            slot_winding[s] = slot_winding[s] + turn
+                    ends = wp.vec2(a[0], b[0])
+                    if not level:
+                        ends = cut_to_row(a, b, low, high)
+                    state = int(constants.PARTIAL)
+                    if level or (borders and on_border(a[0], b[0])):
+                        state = constants.PARTIAL + constants.ALIGNED
+                    s0 = wp.max(slot + tile_of(wp.min(ends[0], ends[1]) - MARGIN - left, wide), slot)
+                    s1 = wp.min(slot + tile_of(wp.max(ends[0], ends[1]) + MARGIN - left, wide), end - 1)
+                    for s in range(s0, s1 + 1):
+                        slot_state[s] = slot_state[s] | state
+        first = stop
     for s in range(slot, end):
         winding += slot_winding[s]
         slot_winding[s] = winding
@@ -288,7 +322,34 @@ def fold(s: wp.float32) -> wp.float32:
     """Return a winding-weighted area's signed distance from the nearest even number: by the even-odd rule,
     its magnitude is the coverage and its sign that of the coverage's derivative.
     """
-    return s - 2.0 * wp.floor(0.5 * s + 0.5)
+    shifted = 0.5 * s + 0.5
+    below = float(int(shifted))  # and not floor, which is a call for each number
+    if below > shifted:
+        below -= 1.0
+    return s - 2.0 * below
+
+
+@wp.func
+def fold_columns(
+    coverage: wp.array2d[tile_column],
+    slot_state: wp.array[wp.int32],
+    slot_winding: wp.array[wp.int32],
+    first: wp.int32,
+    last: wp.int32,
+):
+    """Compute prefix sums along the rows of the slots [first, last), folded: 16 rows at a time."""
+    total = tile_column(0.0)
+    for s in range(first, last):
+        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
+            columns = int(constants.TILE)  # not unrolled: as fast, and sooner compiled
+            for x in range(columns):
+                total = total + coverage[s, x]
+                value = tile_column(0.0)
+                for y in range(constants.TILE):
+                    value[y] = fold(total[y])
+                coverage[s, x] = value
+        else:
+            total = float(slot_winding[s]) * tile_column(1.0)
 
 
 @wp.func
@@ -358,6 +419,7 @@ def make_forward(column: Any) -> wp.Kernel:
         vertex_last: wp.array[wp.int32],  # [shape_count]
         vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
         vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+        reach: wp.array[wp.vec2],  # [vertex_capacity / EDGE_BLOCK] px
         # Out:
         coverage: wp.array2d[column],  # [slot_capacity, columns] in [-1, 1], signed where not ALIGNED
         coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
@@ -386,27 +448,31 @@ def make_forward(column: Any) -> wp.Kernel:
         top = constants.TILE * row[3]
         row_first = top + lane * lane_rows
         left = float(constants.TILE * row[1])
-        for j in range(vertex_first[shape], vertex_last[shape]):
-            a = vertex[j]
-            b = vertex[vertex_next[j]]
-            add_edge(
-                coverage_pixels,
-                slot,
-                a,
-                b,
-                left,
-                constants.TILE * row[2],
-                top,
-                row_first,
-                row_first + lane_rows,
-            )
+        last = vertex_last[shape]
+        first = vertex_first[shape]
+        while first < last:
+            block = first / constants.EDGE_BLOCK
+            stop = wp.min(constants.EDGE_BLOCK * (block + 1), last)
+            if reach[block][0] <= float(row_first + lane_rows) and reach[block][1] >= float(row_first):
+                for j in range(first, stop):
+                    add_edge(
+                        coverage_pixels,
+                        slot,
+                        vertex[j],
+                        vertex[vertex_next[j]],
+                        left,
+                        constants.TILE * row[2],
+                        top,
+                        row_first,
+                        row_first + lane_rows,
+                    )
+            first = stop
         if by_rows:
             sum_row(coverage_pixels, slot_state, slot_winding, slot, end, lane, rule[shape])
         elif rule[shape] == constants.NONZERO:
             sum_columns(coverage, slot_state, slot_winding, slot, end)
         else:
-            for y in range(constants.TILE):
-                sum_row(coverage_pixels, slot_state, slot_winding, slot, end, y, rule[shape])
+            fold_columns(coverage, slot_state, slot_winding, slot, end)
         keep_slopes(coverage_pixels, slot_state, slot, end, row_first - top, lane_rows)
 
     return fill_forward

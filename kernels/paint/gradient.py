@@ -4,7 +4,7 @@ A frame maps the gradient's unit space to the canvas; a pixel's centre, mapped b
 linear gradient that is its first coordinate; on a radial one it says which of the circles between the focus
 and the unit circle goes through it: the larger root s of |p - c0 + s c0| = r0 + s (1 - r0). Between two stops
 colours and opacities are interpolated, colours not premultiplied, at t after the spread.
-``gradient_kernels`` are faster for the common cases, ramps and chains.
+``gradient_forward`` are faster for the common cases, ramps and chains.
 """
 
 from typing import Any
@@ -19,6 +19,8 @@ TINY = wp.constant(1.0e-12)
 RAMP = wp.constant(0)
 CHAIN = wp.constant(1)
 GENERAL = wp.constant(2)
+
+NAMES = {RAMP: "ramp", CHAIN: "chain", GENERAL: "gradient"}
 
 frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 """Origin, first axis, second axis."""

@@ -12,7 +12,7 @@ from tests.fuzz.cases import TARGETS, Case, Cases, Command, judge, lay_out, run_
 pytestmark = pytest.mark.slow
 
 SEED = 21
-COUNTS = {"image": 100, "svg": 40, "yaml": 50, "options": 50, "checkpoint": 30, "manifest": 40}
+COUNTS = {"image": 60, "svg": 40, "yaml": 50, "options": 50, "checkpoint": 30, "manifest": 40}
 
 
 @pytest.mark.parametrize("target", TARGETS)

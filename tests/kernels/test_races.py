@@ -14,7 +14,7 @@ import pytest
 import warp as wp
 
 from tests import needs
-from tests.drawing.drawings import logo
+from tests.drawing.drawings import BLUE, GOLD, WHITE, disc, drawing, polygon
 from tests.fit.pictures import step_for, steps_of_all_kinds
 from tests.helpers import renderer_for
 from tests.kernels import racing
@@ -82,8 +82,10 @@ def opaque_results() -> Iterator[Arrays]:
 def drawing_results() -> Iterator[Arrays]:
     """Fit and tidy a drawing; yield its points."""
     backend = Backend.on("cpu", THREADS)
-    target = render(logo().scene, backend=backend)
-    done = finish_drawing(target, logo(spread=0.5), Run(backend), finest=10)
+    shapes = (BLUE, [disc(10, 9, 7)]), (GOLD, [polygon((4, 12), (12, 12), (20, 12), (17, 18), (5, 18))])
+    exact, spread = (drawing(Canvas(24, 20, WHITE), *shapes, spread=far) for far in (0.0, 0.5))
+    target = render(exact.scene, backend=backend)
+    done = finish_drawing(target, spread, Run(backend), finest=10)
     yield [done.drawing.scene.points]
 
 

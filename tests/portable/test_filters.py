@@ -52,6 +52,18 @@ def test_blurred_as_by_opencv(name: str, border: filters.Border, sigma: float) -
     assert_near(filters.gaussian_blur(IMAGES[name], sigma, border), theirs)
 
 
+def test_a_blur_within_a_ring_leaves_out_what_is_far_and_has_the_same_bits() -> None:
+    image, ring = RANDOM.uniform(size=(250, 311, 4)).astype(np.float32), np.zeros((250, 311), np.bool_)
+    ring[3:, :300] = True
+    ring[9:240, 8:290] = False
+    soft = filters.blurred_within(image, ring, 1.5)
+    weight = filters.gaussian_blur(ring, 1.5)
+    every = filters.gaussian_blur(image * ring[..., None], 1.5) / np.maximum(weight, 1e-3)[..., None]
+    assert (soft[ring] == every[ring]).all()
+    assert not soft[96:160, 96:160].any()
+    assert (filters.blurred_within(image[..., 0], ring, 1.5) == soft[..., 0]).all()
+
+
 @pytest.mark.parametrize("name", IMAGES)
 @pytest.mark.parametrize("size", [1, 3, 4, 9, 15])
 def test_boxes_as_by_opencv(name: str, size: int) -> None:

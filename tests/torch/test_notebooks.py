@@ -31,14 +31,18 @@ def outputs(notebook: Any) -> list[tuple[str, ...]]:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Jupyter's parts, about one another
 @NOTEBOOKS
-def test_it_runs_and_shows_what_is_stored(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_runs_and_shows_what_is_stored(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    found = from_script("run")(path)
-    stored = json.loads(path.read_text("utf-8"))
-    assert list(map(set, outputs(found))) == list(map(set, outputs(stored)))
+    stored = path.read_text("utf-8")
+    short = tmp_path / path.name
+    short.write_text(stored.replace("range(81)", "range(21)"), "utf-8")
+    found = from_script("run")(short)
+    assert list(map(set, outputs(found))) == list(map(set, outputs(json.loads(stored))))
 
 
 @NOTEBOOKS

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +12,8 @@ import numpy as np
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
-from warpsplat.drawing.trace.trace import trace
+from warpsplat.drawing.trace.trace import Traced, trace, unchecked
+from warpsplat.errors import Stopped
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import Palette, solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -18,6 +21,7 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import psnr_of_file
 from warpsplat.portable import elementary
+from warpsplat.portable.filters import boxed
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
@@ -26,6 +30,10 @@ LEAST_ORIGINAL_SIDE = 96
 
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
+
+TRACE_SHARE, QUICK_PIXELS = 0.6, 131_072
+"""Share of the time left that a trace may take before one of fewer pixels begins, and the pixels of the last,
+which is not given up: it takes less than a second."""
 
 DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
@@ -56,9 +64,7 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
     size, settings = enlargement(problem.target), problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        scene = trace(
-            continued(original(problem.target), across, down), most=most, price=byte_price(settings)
-        ).scene
+        scene = trace_in_time(continued(original(problem.target), across, down), most, settings, run).scene
         if settings.is_limited:
             scene = limited(scene.take(solid_shapes(scene)), settings)
         scene = enlarged(cut(scene, across, down), size, *problem.size)
@@ -72,6 +78,22 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
         return traced()
     others = [lambda: traced(*margin), lambda: draw_pixels(problem, run)]
     return best_of_thin(traced(), others[: 1 if most is not None else 2])
+
+
+def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: Run) -> Traced:
+    """Trace an image; at a lower resolution where the run's time is too short, or it is stopped."""
+    height, width = image.shape[:2]
+
+    def traced(factor: int, check: Callable[[], None]) -> Traced:
+        small = boxed(image, factor) if factor > 1 else image
+        found = trace(small, most=most, price=byte_price(settings), check=check)
+        return replace(found, scene=enlarged(found.scene, factor, width, height))
+
+    least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))
+    for factor in range(1, min(least, 3)):
+        with contextlib.suppress(Stopped):
+            return traced(factor, run.within(TRACE_SHARE).check)
+    return traced(least, unchecked)
 
 
 def draw_pixels(problem: Problem, run: Run) -> Fit:

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from functools import partial
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.chroma import finish_by_lightness
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, enlargement, limited, original
+from warpsplat.drawing.draft import (
+    as_fit,
+    byte_price,
+    draw_pixels,
+    enlargement,
+    limited,
+    original,
+    trace_in_time,
+)
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
-from warpsplat.drawing.tidy import Finished, finish_drawing
-from warpsplat.drawing.trace.trace import trace
+from warpsplat.drawing.tidy import Finished
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -19,8 +28,14 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene.geometry import enlarged
 
+SECONDS_PER_TRACED = 4e-6
+"""Rough time of tracing a pixel on one core [s]."""
+
 SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5.5e-4, 1.5e-6
 """Rough time of fitting a trace on one core [s]."""
+
+SECONDS_PER_WRITTEN = 6e-5
+"""Rough time of writing a node [s]."""
 
 LONG = 4.0
 """Time from which on it is announced [s]."""
@@ -32,9 +47,13 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes."""
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
+    announce_trace(problem)
+    traced = trace_regions(problem, run, most)
+    announce_fit(traced, problem)
+    run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
     finish = partial(
-        finish_drawing,
+        finish_by_lightness,
         original(problem.target),
         finest=finest(settings),
         price=byte_price(settings),
@@ -47,30 +66,35 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         return sketch if best is sketch.fit else Sketch(best, _size(best, settings), None)
 
     def fewer(count: int) -> Sketch:
-        return sketch_of(finish(trace_regions(problem, count), next(parts), tidy=settings.tidy), count)
+        return sketch_of(finish(trace_regions(problem, run, count), next(parts), tidy=settings.tidy), count)
 
     def simpler(drawing: Drawing, price: float) -> Sketch:
         return _sketch(problem, run, finish(drawing, next(parts), price=price * byte_price(settings)))
 
-    traced = trace_regions(problem, most)
-    if settings.time_budget is None:
-        warn_if_long(traced, problem)
     first = sketch_of(finish(traced, next(parts), tidy=settings.tidy), most)
     if not limit or first.size <= limit:
         return first.fit
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
 
 
-def warn_if_long(traced: Drawing, problem: Problem) -> None:
-    """Say so if the fit of a traced drawing will take long, and what makes it shorter."""
+def announce_trace(problem: Problem) -> None:
+    """Say so if the trace of an image will take long."""
+    pixels = original(problem.target)[..., 0].size
+    _announce(problem, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_TRACED * pixels)
+
+
+def announce_fit(traced: Drawing, problem: Problem) -> None:
+    """Say so if the fit of a traced drawing will take long."""
     nodes, (width, height) = len(traced.joints) // 3, problem.size
     seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
-    if seconds > LONG:
-        log.warning(
-            "fitting its %s nodes takes about %.0f s; --time-budget or --quality draft make it shorter",
-            f"{nodes:,}",
-            seconds,
-        )
+    _announce(problem, f"fitting its {nodes:,} nodes", seconds)
+
+
+def _announce(problem: Problem, work: str, seconds: float) -> None:
+    """Say so if work will take long and has no time limit, and what makes it shorter."""
+    if seconds > LONG and problem.settings.time_budget is None:
+        how = "--time-budget or --quality draft make it shorter"
+        log.warning("%s takes about %.0f s; %s", work, seconds, how)
 
 
 def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
@@ -87,20 +111,22 @@ def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     across, down = margins(problem.target, THIN_SIDE)
     wide = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
-    drawing, grid = trace_regions(wide, most), finest(settings)
+    drawing, grid = trace_regions(wide, run, most), finest(settings)
     price = byte_price(settings)
-    done = finish_drawing(original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price)
+    done = finish_by_lightness(
+        original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price
+    )
     made = _sketch(wide, run, done).fit
     return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
 
 
-def trace_regions(problem: Problem, most: int | None) -> Drawing:
+def trace_regions(problem: Problem, run: Run, most: int | None) -> Drawing:
     """Trace an image as it was before it was enlarged, in the colours that are allowed.
 
     ``most``: regions.
     """
     settings = problem.settings
-    traced = trace(original(problem.target), most=most, price=byte_price(settings))
+    traced = trace_in_time(original(problem.target), most, settings, run)
     drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
@@ -117,7 +143,7 @@ def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
 
         scene = with_strokes(scene, problem.settings, run)
     per_pixel = done.per_pixel / size
-    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)):
+    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)) or math.isnan(done.psnr):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
         made = Fit(scene, per_pixel, done.psnr, done.psnr, 0, run.stopped())

@@ -90,7 +90,12 @@ class ShapeCandidate:
 
 
 def with_shapes(
-    target: FloatArray, drawing: Drawing, errors_of: Errors, errors: Floats, worth: float
+    target: FloatArray,
+    drawing: Drawing,
+    errors_of: Errors,
+    errors: Floats,
+    worth: float,
+    over: Callable[[], bool] = bool,
 ) -> Drawing:
     """Return a drawing with exact basic shapes where they cost less error than their bytes are worth.
 
@@ -100,8 +105,9 @@ def with_shapes(
         errors_of: The judge of drawings.
         errors: Those of the drawing.
         worth: Mean squared error that a byte is worth.
+        over: Whether there is no time for more.
     """
-    left = with_equal_values(_candidates(target, drawing, worth), worth)
+    left = with_equal_values(_candidates(target, drawing, worth, over), worth)
     cells = _cells(left)
     for _ in range(CHECKS):
         if not left:
@@ -128,7 +134,9 @@ def _cells(candidates: Sequence[ShapeCandidate]) -> dict[int, Cells]:
     return found
 
 
-def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[ShapeCandidate]:
+def _candidates(
+    target: FloatArray, drawing: Drawing, worth: float, over: Callable[[], bool]
+) -> list[ShapeCandidate]:
     """Return the basic shape of each contour that is near to one, the cheapest by error and bytes."""
     scene = drawing.scene
     pieces = np.diff(scene.starts) // 3
@@ -146,7 +154,7 @@ def _candidates(target: FloatArray, drawing: Drawing, worth: float) -> list[Shap
     for family in FAMILIES:
         # Families come by size: a shape that costs less than the size of the next one alone is the best.
         rows = np.flatnonzero(least >= worth * family.size)
-        if not len(rows):
+        if not len(rows) or over():
             break
         rows, begun = _likely(family, rows, samples, worth * (sizes - family.size))
         if not len(rows):

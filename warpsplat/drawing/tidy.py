@@ -154,7 +154,7 @@ def with_exact_shapes(
     errors = errors_of(drawing)
     size = estimated_size(drawing.scene, DRAFT_GRID)
     worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
-    exact = with_shapes(target, drawing, errors_of, errors, worth)
+    exact = with_shapes(target, drawing, errors_of, errors, worth, run.over)
     if not symbols:
         return exact, []
     return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
@@ -185,6 +185,8 @@ def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool)
         # Outlines without candidates, or whose candidates are all refused, stay as they are.
         refused[~stale[contour]] = True
         while len(left.at):
+            if over():
+                return drawing
             edited, keep = applied(drawing, left)
             moved = model.carried(samples, drawing, left, keep)
             if fit_before:

@@ -37,9 +37,9 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
         points_grad = view(grad, wp.vec2, grad.shape[:1])
         program.launch(adam.tie_twins, grad.shape[0], parameters.arrays, points_grad=points_grad)
     if parameters.has_circles:
-        from warpsplat.kernels.paint import gradient_kernels  # takes long to import
+        from warpsplat.kernels.paint import gradient_backward  # takes long to import
 
-        program.launch(gradient_kernels.tie_circles, parameters.shape_count, parameters.arrays)
+        program.launch(gradient_backward.tie_circles, parameters.shape_count, parameters.arrays)
     units = units_of(settings, parameters.canvas)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(

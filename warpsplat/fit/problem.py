@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from warpsplat.errors import Stopped
 from warpsplat.fit.checkpoint import Checkpoint
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.progress import Callback, Progress
@@ -80,6 +81,11 @@ class Run:
     def over(self) -> bool:
         """Return whether the run has to end, since it was stopped or its time is up."""
         return time.monotonic() > self.deadline or self.stopped()
+
+    def check(self) -> None:
+        """Raise ``Stopped`` if the run has to end."""
+        if self.over():
+            raise Stopped
 
     def report(self, progress: Progress) -> None:
         """Pass a progress report on."""

@@ -25,6 +25,9 @@ Border = Literal["reflect101", "replicate"]
 BAND = 1 << 16
 """Numbers in a band: a few such arrays fit a processor's L2 cache."""
 
+BLOCK = 32
+"""Sides of the blocks that masks are cut into [px]."""
+
 CUBIC = -0.75
 """Slope of cubic interpolation's kernel at 1, as in OpenCV."""
 
@@ -133,6 +136,16 @@ def resize_area(image: Floats, size: tuple[int, int]) -> Floats:
     return _resized(image, size, _area_taps)
 
 
+def boxed(image: Floats, factor: int) -> Floats:
+    """Return means of squares of ``factor`` x ``factor`` px; beyond the border its pixels repeat."""
+    height, width = image.shape[:2]
+    size = (-(-width // factor), -(-height // factor))
+    below, right = size[1] * factor - height, size[0] * factor - width
+    if below or right:
+        image = np.pad(image, ((0, below), (0, right), *[(0, 0)] * (image.ndim - 2)), mode="edge")
+    return resize_area(image, size)
+
+
 def resize_linear(image: Floats, size: tuple[int, int]) -> Floats:
     """Return an image at another size (width, height) [px], interpolated linearly at pixel centres."""
     return _resized(image, size, functools.partial(_point_taps, cubic=False))
@@ -207,6 +220,36 @@ def gaussian_blur(image: Floats, sigma: float, border: Border = "reflect101") ->
     weights = elementary.exp(offsets * offsets * (-0.5 / (sigma * sigma)))
     kernel = (weights / weights.sum()).tolist()
     return _convolved(image, kernel, kernel, border)
+
+
+def blurred_within(image: Floats, mask: npt.NDArray[np.bool_], sigma: float) -> Floats:
+    """Return ``gaussian_blur`` of the pixels of a mask alone; elsewhere than there it may be 0.
+
+    Blocks without such pixels are left out where that is quicker: the mask may be a ring around an image.
+    """
+    margin, (height, width) = (round(8 * sigma + 1) | 1) // 2, mask.shape
+    tops, lefts = np.arange(0, height, BLOCK), np.arange(0, width, BLOCK)
+    taken = np.logical_or.reduceat(np.logical_or.reduceat(mask, tops, axis=0), lefts, axis=1)
+    rows, columns = np.nonzero(taken)
+    side = BLOCK + 2 * margin
+    if len(rows) * side * side >= height * width:
+        return _normalized_blur(image, mask, sigma)
+    near, own = np.arange(-margin, BLOCK + margin), np.arange(BLOCK)
+    ys = _beyond(tops[rows, None] + near, height, "reflect101")[:, :, None]
+    xs = _beyond(lefts[columns, None] + near, width, "reflect101")[:, None]
+    soft = _normalized_blur(
+        image[ys, xs].reshape(-1, side, *image.shape[2:]), mask[ys, xs].reshape(-1, side), sigma
+    )
+    soft = soft.reshape(len(rows), side, side, *image.shape[2:])[:, margin:-margin, margin:-margin]
+    found = np.zeros((len(tops) * BLOCK, len(lefts) * BLOCK, *image.shape[2:]), soft.dtype)
+    found[(tops[rows, None] + own)[:, :, None], (lefts[columns, None] + own)[:, None]] = soft
+    return found[:height, :width]
+
+
+def _normalized_blur(image: Floats, mask: npt.NDArray[np.bool_], sigma: float) -> Floats:
+    shaped = mask.reshape(*mask.shape, *[1] * (image.ndim - 2))
+    weight = gaussian_blur(shaped.astype(np.float32), sigma).reshape(shaped.shape)
+    return np.asarray(gaussian_blur((image * shaped).astype(np.float32), sigma) / np.maximum(weight, 1e-3))
 
 
 def box_sum(image: Floats, size: int) -> Floats:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from torch._utils import _flatten_dense_tensors
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
@@ -246,29 +247,37 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
 def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[object]:
     """Return shapes, groups and gradients and their fields, which are compared by identity."""
     owners: list[object] = [*shapes, *groups]
-    fields = list(chain.from_iterable(vars(each).values() for each in owners))
-    gradients = [each for each in fields if isinstance(each, (LinearGradient, RadialGradient))]
-    return owners + fields + list(chain.from_iterable(vars(each).values() for each in gradients))
+    fields = list(chain.from_iterable(map(dict.values, map(vars, owners))))
+    if not {LinearGradient, RadialGradient}.isdisjoint(map(type, fields)):
+        gradients = [each for each in fields if isinstance(each, (LinearGradient, RadialGradient))]
+        fields += chain.from_iterable(vars(each).values() for each in gradients)
+    return owners + fields
 
 
-def _numbers(
-    shapes: Sequence[Shape], groups: Sequence[ShapeGroup], tensors: Sequence[Tensor]
-) -> Iterator[object]:
-    """Yield sizes of tensors, and numbers that belong to the structure.
+def _numbers(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[Tensor | list[object]]:
+    """Return the numbers that belong to the structure, those of each field together.
 
-    They are compared by value, as code can write into tensors without leaving a trace; and one by one, as
-    thousands of new objects at a time would have Python look for cycles.
+    They are compared by value, as code can write into tensors without leaving a trace.
     """
-    for tensor in tensors:
-        yield tensor.shape
-    for shape in shapes:
-        if isinstance(shape, Path):
-            yield _list(shape.num_control_points)
-    for group in groups:
-        matrix = group.shape_to_canvas
-        yield _list(group.shape_ids)
-        yield matrix.tolist()
-        yield matrix.requires_grad
+    matrices = [group.shape_to_canvas for group in groups]
+    return [
+        _joined([shape.num_control_points for shape in shapes if isinstance(shape, Path)]),
+        _joined([group.shape_ids for group in groups]),
+        _joined(matrices),
+        [matrix.requires_grad for matrix in matrices],
+    ]
+
+
+@torch.no_grad()
+def _joined(values: Sequence[Any]) -> Tensor | list[object]:
+    """Return all numbers of tensors or lists: a few operations for many tensors on the CPU."""
+    if values and all(isinstance(each, Tensor) and each.is_cpu for each in values):
+        return _flatten_dense_tensors(values)
+    return [each.tolist() if hasattr(each, "tolist") else list(each) for each in values]
+
+
+def _equal(a: Tensor | list[object], b: Tensor | list[object]) -> bool:
+    return torch.equal(a, b) if isinstance(a, Tensor) and isinstance(b, Tensor) else bool(a == b)
 
 
 class _Cached(NamedTuple):
@@ -279,7 +288,9 @@ class _Cached(NamedTuple):
     objects: list[object]
     tensors: list[Tensor]
     """Those of the objects."""
-    numbers: list[object]
+    sizes: list[int]
+    """How many numbers each has."""
+    numbers: list[Tensor | list[object]]
     scene: SceneArguments
 
 
@@ -298,7 +309,8 @@ def serialize_cached(
         and frame == last.frame
         and len(objects) == len(last.objects)
         and all(map(operator.is_, objects, last.objects))
-        and all(map(operator.eq, _numbers(shapes, groups, last.tensors), last.numbers))
+        and list(map(Tensor.numel, last.tensors)) == last.sizes
+        and all(map(_equal, _numbers(shapes, groups), last.numbers))
     ):
         return last.scene
     scene = serialize(width, height, shapes, groups, device)
@@ -306,7 +318,8 @@ def serialize_cached(
     # Copies and results of operations are made again for each scene.
     if all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors):
         tensors = [each for each in objects if isinstance(each, Tensor)]
-        _last = _Cached(frame, objects, tensors, list(_numbers(shapes, groups, tensors)), scene)
+        numbers = _numbers(shapes, groups)
+        _last = _Cached(frame, objects, tensors, list(map(Tensor.numel, tensors)), numbers, scene)
     else:
         _last = None
     return scene

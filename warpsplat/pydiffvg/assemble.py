@@ -7,7 +7,7 @@ import math
 import torch
 
 from warpsplat.pydiffvg.arguments import SceneArguments
-from warpsplat.pydiffvg.gather import Concatenate
+from warpsplat.pydiffvg.gather import GatherAll
 from warpsplat.pydiffvg.layout import GradientTensors, Layout
 
 Tensor = torch.Tensor
@@ -20,27 +20,25 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     """Return the attributes of ``layout.scene`` by name, in pixels of the image."""
     canvas = layout.scene.canvas
     scale = canvas.width / scene.width, canvas.height / scene.height
-    numbers: Tensor = Concatenate.apply(scene.places, *scene.tensors)
-    points = layout.points(numbers)
+    numbers, points, colors, opacities, *widths = GatherAll.apply(
+        scene.places, layout.gathers, *scene.tensors
+    )
     if layout.order is not None:
         points = torch.cat([points, *(area.points(numbers) for area in layout.areas)])
         points = points.index_select(0, layout.order)
-    widths = None
-    if layout.widths is not None:
-        widths = 2 * math.sqrt(scale[0] * scale[1]) * numbers.index_select(0, layout.widths)
+    widths = [2 * math.sqrt(scale[0] * scale[1]) * each for each in widths]
     if layout.transforms is not None:
         matrices = numbers.index_select(0, layout.transforms.entries).view(-1, 3, 3)
         own = matrices.index_select(0, layout.transforms.point_group)
         points = torch.einsum("pij,pj->pi", own[:, :2, :2], points) + own[:, :2, 2]
-        if widths is not None:
+        if widths:
             areas = matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0]
-            widths = widths * areas.abs().sqrt().index_select(0, layout.transforms.row_group)
+            widths[0] = widths[0] * areas.abs().sqrt().index_select(0, layout.transforms.row_group)
     if scale != (1.0, 1.0):
         points = points * torch.tensor(scale, device=points.device)
-    paints = numbers.index_select(0, layout.paints).view(-1, 4)
-    values = layout.defaults | {"points": points, "colors": paints[:, :3], "opacities": paints[:, 3]}
-    if widths is not None:
-        values["widths"] = widths.clamp_min(0)
+    values = layout.defaults | {"points": points, "colors": colors, "opacities": opacities}
+    if widths:
+        values["widths"] = widths[0].clamp_min(0)
     if layout.gradients is not None:
         values |= _gradients(numbers, layout.gradients, torch.tensor(scale, device=numbers.device))
     return values

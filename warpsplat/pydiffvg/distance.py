@@ -17,7 +17,7 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.pydiffvg.arguments import ZERO, SceneArguments, ShapeStructure, Structure
-from warpsplat.pydiffvg.gather import Concatenate, Gather, Terms, combined, on
+from warpsplat.pydiffvg.gather import Gather, GatherAll, Terms, combined, on
 from warpsplat.pydiffvg.kernels import distance as kernels
 from warpsplat.pydiffvg.layout import IDENTITY, KEPT, coordinates, indices, segments
 from warpsplat.rendering.backend import Backend
@@ -57,7 +57,7 @@ def distances(scene: SceneArguments, positions: Tensor, threads: int) -> Tensor:
     curves = curves_of(scene.structure, positions.device)
     if not len(curves.kind):
         return torch.zeros(len(positions), device=positions.device)
-    numbers: Tensor = Concatenate.apply(scene.places, *scene.tensors)
+    numbers: Tensor = GatherAll.apply(scene.places, (), *scene.tensors)[0]
     controls = curves.controls(numbers)
     if curves.transforms is not None:
         matrices = numbers.index_select(0, curves.transforms).view(-1, 1, 3, 3)

@@ -1,4 +1,4 @@
-"""One tensor with all numbers of a scene, and weighted sums of them, differentiated as a whole."""
+"""A scene's tensors -> weighted sums of their numbers, differentiated as a whole."""
 
 from __future__ import annotations
 
@@ -18,27 +18,6 @@ Place = tuple[tuple[int, ...], tuple[int, ...], int]
 FIRST = 2
 """Index of the first number of a scene's tensors: the constants 0 and 1 come before."""
 Index = npt.NDArray[np.int64]
-
-
-class Concatenate(torch.autograd.Function):
-    """Tensors -> the numbers 0 and 1, then their values one after the other.
-
-    One operation for all of them: one of torch's for each of hundreds of tensors takes longer than rendering.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, places: Sequence[Place], *tensors: Tensor) -> Tensor:
-        """Return the numbers, shape (number,); ``places``: of the tensors among them."""
-        ctx.places = places
-        constants = torch.tensor([0.0, 1.0], dtype=torch.float32, device=tensors[0].device)
-        return _flatten_dense_tensors((constants, *tensors))
-
-    @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
-        """Return views of the gradient in the shapes of the tensors."""
-        whole = grad.clone(memory_format=torch.contiguous_format)
-        each = zip(ctx.places, ctx.needs_input_grad[1:], strict=True)
-        return None, *(whole.as_strided(*place) if needed else None for place, needed in each)
 
 
 def places_of(tensors: Sequence[Tensor]) -> tuple[Place, ...]:
@@ -88,6 +67,52 @@ class Gather:
         if self._weight is None:
             return found.view(self._shape)
         return (self._weight * found.view(self._weight.shape)).sum(dim=0)
+
+    def add_gradient(self, total: Tensor, grad: Tensor) -> None:
+        """Add the gradient of the numbers to ``total``, shape (number,); ``grad``: that of the sums."""
+        each = grad if self._weight is None else self._weight * grad
+        total.index_add_(0, self._index, each.reshape(-1))
+
+
+class GatherAll(torch.autograd.Function):
+    """Tensors -> their numbers one after the other, behind the constants 0 and 1; and sums of these.
+
+    One operation for all of them: one of torch's for each of hundreds of tensors takes longer than rendering.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any, places: Sequence[Place], gathers: Sequence[Gather], *tensors: Tensor
+    ) -> tuple[Tensor, ...]:
+        """Return the numbers, shape (number,), and the sums; ``places``: of the tensors among the numbers."""
+        ctx.places, ctx.gathers = places, gathers
+        ctx.set_materialize_grads(False)
+        constants = torch.tensor([0.0, 1.0], dtype=torch.float32, device=tensors[0].device)
+        numbers = _flatten_dense_tensors((constants, *tensors))
+        ctx.count = len(numbers)
+        return numbers, *(gather(numbers) for gather in gathers)
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor | None, *grads: Tensor | None) -> tuple[Tensor | None, ...]:
+        """Return views of the gradient in the shapes of the tensors."""
+        given = [(gather, own) for gather, own in zip(ctx.gathers, grads, strict=True) if own is not None]
+        if grad is None and not given:
+            return (None,) * len(ctx.needs_input_grad)
+        total = (
+            grad.clone(memory_format=torch.contiguous_format)
+            if grad is not None
+            else given[0][1].new_zeros(ctx.count)
+        )
+        for gather, own in given:
+            gather.add_gradient(total, own)
+        each = zip(ctx.places, ctx.needs_input_grad[2:], strict=True)
+        return None, None, *(total.as_strided(*place) if needed else None for place, needed in each)
+
+
+def picked(indices: npt.ArrayLike, device: torch.device) -> Gather:
+    """Return what picks single numbers, in the shape of their ``indices``."""
+    found = np.asarray(indices, np.int64)[..., None]
+    return Gather(Terms(found, np.ones(found.shape)), device)
 
 
 def on(array: npt.NDArray[Any], device: torch.device) -> Tensor:

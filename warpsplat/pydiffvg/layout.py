@@ -14,7 +14,7 @@ import numpy.typing as npt
 import torch
 
 from warpsplat.pydiffvg.arguments import ONE, ZERO, GroupStructure, PaintStructure, ShapeStructure, Structure
-from warpsplat.pydiffvg.gather import Gather, Terms, combined, on
+from warpsplat.pydiffvg.gather import Gather, Terms, combined, on, picked
 from warpsplat.pydiffvg.tapered import contour_sizes, contours_around
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.models import EXACT
@@ -112,17 +112,15 @@ class Layout:
     """Structure and canvas; its attributes are placeholders."""
     defaults: dict[str, Tensor]
     """Attributes by name, for those that come from no number."""
-    points: Gather
-    """Control points of outlines [shape units], shape (point, 2)."""
+    gathers: tuple[Gather, ...]
+    """Of numbers: control points of outlines [shape units], shape (point, 2); the rows' colours, black for
+    gradients, (row, 3), and opacities, (row,); half widths, 0 for fills, (row,), unless no stroke has one
+    width."""
     areas: tuple[Area, ...]
     order: Tensor | None
     """Index of each of the scene's points among those of outlines and then of areas; None: the same order."""
     transforms: Transforms | None
     """None: all are the identity."""
-    paints: Tensor
-    """Indices of colours and opacities, constants for gradients; shape (4 x row,)."""
-    widths: Tensor | None
-    """Indices of half widths, 0 for fills, shape (row,); None: there are no strokes of one width."""
     gradients: GradientTensors | None
     spec: RenderSpec
     """Specification of the engine that renders the scene without premultiplying its colours."""
@@ -164,16 +162,19 @@ def make_layout(
     paints = [
         range(p.first, p.first + 4) if p.kind == Paint.FLAT else BLACK for p in (row.paint for row in rows)
     ]
+    colors = np.array(paints, np.int64).reshape(-1, 4)
     widths = [row.shapes[0].width if row.kind == Kind.STROKE else ZERO for row in rows]
+    picks: list[npt.ArrayLike] = [colors[:, :3], colors[:, 3], *([widths] if any(widths) else [])]
     return Layout(
         scene,
         {a.name: on(getattr(scene, a.name), device) for a in attributes_of(scene)},
-        Gather(combined([NOTHING, *itertools.chain(*outlines)], np.concatenate), device),
+        (
+            Gather(combined([NOTHING, *itertools.chain(*outlines)], np.concatenate), device),
+            *(picked(each, device) for each in picks),
+        ),
         areas,
         order,
         _transforms(rows, structure.groups, scene, device),
-        indices(paints, device),
-        indices([widths], device) if any(widths) else None,
         _gradients(rows, device) if any(row.paint.kind != Paint.FLAT for row in rows) else None,
         RenderSpec(scene, Viewport(*size), EXACT, device, threads, opaque=True, straight=True),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 from warpsplat.torch import SceneTensors, render
 from warpsplat.torch.engine import check_memory
 from warpsplat.torch.function import draw
+from warpsplat.torch.tensors import extremes
 
 Tensor = torch.Tensor
 
@@ -247,7 +249,7 @@ def _render(
             if name in values:
                 values[name] = values[name].clone()
                 values[name][:, move[0]] += move[1]
-    if not bool(values["points"].isfinite().all()):
+    if not all(map(math.isfinite, *extremes([values["points"]]))):
         raise UsageError("a point of a shape is not finite: an optimiser diverged, or a shape has no size")
     if print_timing:
         print(f"Scene construction, time: {time.perf_counter() - began:.5f} s")

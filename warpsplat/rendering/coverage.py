@@ -77,6 +77,10 @@ class ExactCoverage:
         if outline.stroker:
             nonzero = inputs.backend.array(wp.int32, inputs.parameters.shape_count)
             self._edges[constants.STYLED] = (outline.stroker.edges(), arrays | {"rule": nonzero})
+        self._blocks = -(-inputs.samples // constants.EDGE_BLOCK)
+        for part in self._parts:
+            if part != constants.STROKE:
+                self._edges[part] += ({"reach": inputs.backend.array(wp.vec2, self._blocks)},)
 
     def _launch(
         self, program: Program, part: int, kernel: wp.Kernel, dim: int | tuple[int, int], **values: Any
@@ -94,6 +98,7 @@ class ExactCoverage:
                 kernel = stroke.make_forward(backend.column)
                 self._launch(program, part, kernel, (slots, backend.row_lanes))
             else:
+                self._launch(program, part, fill.find_reach, self._blocks)
                 self._launch(program, part, fill.fill_states, slots, own_part=part)
 
     def values(self, program: Program) -> None:

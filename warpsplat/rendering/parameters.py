@@ -70,7 +70,11 @@ class Parameters:
 
     def _upload(self, scene: Scene, moments: Moments, ages: np.ndarray) -> None:
         self._scene = scene
-        values, scene = scene, scene.drawn()
+        self._upload_layout(scene, ages)
+        self._upload_values(scene, moments)
+
+    def _upload_layout(self, values: Scene, ages: np.ndarray) -> None:
+        scene = values.drawn()
         shapes = np.arange(len(scene))
         owner = scene.contour_shapes()
         contours = np.arange(len(owner))
@@ -110,21 +114,22 @@ class Parameters:
             self._upload_styles(scene)
         self.broken = self.backend.array(wp.int32, self.shape_count)
         """[shape] 1 where an update met a number that is not finite; it was left out."""
-        value_shape = self.arrays["point_shape"]
         self.forms: tuple[Basis, ...] = ()
         """The bases of the shapes if some are forms, of which ``rendering.forms`` computes control points."""
         if values.forms():
             self.forms = tuple(map(Basis, np.unique(values.basis).tolist()))
-            value_shape = self._ints(np.repeat(shapes, values.point_counts()))
+
+    def _upload_values(self, scene: Scene, moments: Moments) -> None:
+        shapes = np.arange(len(scene))
         owners = {
-            "point": value_shape,
+            "point": self._ints(np.repeat(shapes, scene.point_counts())),
             "shape": self._ints(shapes),
             "stop": self._ints(np.repeat(shapes, np.diff(scene.stop_first))),
         }
         self.groups: dict[str, Group] = {}
         for a in ATTRIBUTES:
             value, m1, m2 = (
-                self._floats(x, a) for x in (getattr(values, a.name), moments[0][a.name], moments[1][a.name])
+                self._floats(x, a) for x in (getattr(scene, a.name), moments[0][a.name], moments[1][a.name])
             )
             held = self.backend.array(wp.int32, value.shape[0])
             group = Group(a, value, wp.zeros_like(value), m1, m2, owners[a.per], held)
@@ -136,9 +141,9 @@ class Parameters:
             self.arrays |= {
                 "values": self.arrays["points"],
                 "values_grad": self.arrays["points_grad"],
-                "value_first": self._ints(values.first),
-                "value_shape": value_shape,
-                "form": self._ints(values.basis),
+                "value_first": self._ints(scene.first),
+                "value_shape": owners["point"],
+                "form": self._ints(scene.basis),
                 "points": self.backend.array(wp.vec2, self.point_count),
                 "points_grad": self.backend.array(wp.vec2, self.point_count),
             }

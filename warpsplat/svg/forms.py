@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from warpsplat.forms import form_of
-from warpsplat.forms.frame import turned_back
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.svg.paths import Points
 
@@ -44,6 +43,8 @@ def gradient_frames(scene: Scene, per_pixel: float) -> Points:
     frames = (scene.frames.astype(np.float64) * per_pixel).reshape(-1, 3, 2)
     for group in scene.alike():
         if group.basis.is_form and form_of(group.basis.name).TURNED:
+            from warpsplat.forms.frame import turned_back  # imports Warp
+
             degrees = form_of(group.basis.name).numbers(group.points.astype(np.float64) * per_pixel)[:, -1]
             for row in range(3):
                 frames[group.shapes, row] = turned_back(frames[group.shapes, row], degrees)

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import torch
 
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.torch.engine import RenderSpec, engine_of, is_capturing, known
-from warpsplat.torch.tensors import not_finite
+from warpsplat.torch.tensors import check_extremes, extremes
 
 Tensor = torch.Tensor
 
@@ -48,13 +49,9 @@ def examined(spec: RenderSpec, values: Mapping[str, Tensor]) -> RenderSpec:
         return spec
     if is_capturing(spec.device):
         return known(spec)
-    each = [value.isfinite().all() for value in values.values()]
-    if "opacities" in values:
-        each.append((values["opacities"] > OPACITY_RANGE[1]).any())
-    found = torch.stack(each).tolist()  # one transfer from the device
-    opaque = "opacities" in values and found.pop()
-    if not all(found):
-        raise not_finite(name for name, fine in zip(values, found, strict=True) if not fine)
+    found = dict(zip(values, extremes(values.values()), strict=True))
+    check_extremes(found)
+    opaque = "opacities" in found and bool(found["opacities"][1] > np.float32(OPACITY_RANGE[1]))
     return replace(spec, opaque=opaque)
 
 

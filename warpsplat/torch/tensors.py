@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -89,7 +90,11 @@ class SceneTensors:
 
     def drawn(self) -> dict[str, torch.Tensor]:
         """Return the attributes that some shape has, by name, in float32."""
-        return {attribute.name: self.value(attribute) for attribute in attributes_of(self.layout)}
+        return {attribute.name: self.value(attribute) for attribute in self._attributes}
+
+    @functools.cached_property
+    def _attributes(self) -> tuple[Attribute, ...]:
+        return attributes_of(self.layout)
 
     def scene(self) -> Scene:
         """Return a scene of the current values, clamped to what a file can hold.
@@ -97,7 +102,7 @@ class SceneTensors:
         Raises:
             ValueError: a value is not finite.
         """
-        check_finite(self.values)
+        check_extremes(dict(zip(self.values, extremes(self.values.values()), strict=True)))
         arrays: dict[str, Any] = {
             name: np.clip(value.detach().cpu().numpy(), *limits(TABLE[name])).astype(np.float32)
             for name, value in self.values.items()
@@ -117,17 +122,21 @@ def _warn_of_float64() -> None:
     )
 
 
-def check_finite(values: Mapping[str, torch.Tensor]) -> None:
-    """Raise a ``ValueError`` if a number is not finite, with one transfer from the device."""
-    each = [value.detach().isfinite().all() for value in values.values()]
-    finite = torch.stack(each).tolist() if each else []
-    if not all(finite):
-        raise not_finite(name for name, fine in zip(values, finite, strict=True) if not fine)
+def extremes(values: Iterable[torch.Tensor]) -> list[tuple[float, float]]:
+    """Return the least and the largest number of each tensor, 0 if it is empty, NaN if it has one; with one
+    transfer from the device.
+    """
+    filled = (value.detach() if value.numel() else value.new_zeros(1) for value in values)
+    each = [end for value in filled for end in value.aminmax()]
+    ends = torch.stack(each).tolist() if each else []
+    return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def not_finite(names: Iterable[str]) -> ValueError:
-    """Return the error for attributes that have numbers that are not finite."""
-    return ValueError(f"{', '.join(names)}: numbers that are not finite")
+def check_extremes(found: Mapping[str, tuple[float, float]]) -> None:
+    """Raise a ``ValueError`` if a number is not finite; ``found``: ``extremes`` by name."""
+    wrong = [name for name, ends in found.items() if not all(map(math.isfinite, ends))]
+    if wrong:
+        raise ValueError(f"{', '.join(wrong)}: numbers that are not finite")
 
 
 def limits(attribute: Attribute) -> tuple[float, float]:

@@ -52,6 +52,9 @@ def test_a_slope_is_no_noise_but_grain_is() -> None:
     assert noise_of(image) < 0.5
     image[..., :3] += np.random.default_rng(0).normal(0, 4, (80, 80, 1))
     assert noise_of(image) > 3
+    coarse = np.kron(2 * np.random.default_rng(0).integers(0, 2, (40, 40)), np.ones((2, 2)))
+    image[..., :3] = 100 + coarse[..., None]  # steps of a scaled picture differ by no more than they are
+    assert noise_of(image) == 2
 
 
 def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:

@@ -53,6 +53,22 @@ def test_a_trace_of_small_letters_is_near_their_source_at_four_times_the_size(le
     assert -10 * np.log10(((shown - large) ** 2).mean()) > 23
 
 
+@pytest.mark.parametrize(("size", "scale"), [(40, 4), (80, 1)])
+def test_small_images_are_mapped_for_few_thin_parts(size: int, scale: int) -> None:
+    disc = '<circle cx="20" cy="20" r="12.3" fill="#a02030"/><path d="M20.4 20.6h2.1l-.7 1.7z" fill="#fff"/>'
+    image = draw_exactly(ground("#ffffff", size, size) + disc, size, size)
+    assert with_sub_pixels(find_regions(levels(image))).scale == scale
+
+
+def test_tips_are_no_parts_of_their_own() -> None:
+    points = (180, 40), (196, 84), (240, 88), (206, 116), (218, 160), (180, 136), (142, 160), (154, 116)
+    star = "".join(f"L{x / 4.1:.2f} {y / 4.1:.2f}" for x, y in points).replace("L", "M", 1)
+    image = draw_exactly(ground("#ffffff", 64, 44) + f'<path d="{star}z" fill="#143cb4"/>', 64, 44)
+    found = with_sub_pixels(find_regions(levels(image)))
+    assert found.scale > 1
+    assert len(found.paint) == 2
+
+
 def test_broad_shapes_keep_their_pixels() -> None:
     image = draw_exactly(
         ground("#ffffff", 40, 40) + '<circle cx="20" cy="20" r="12.3" fill="#a02030"/>', 40, 40

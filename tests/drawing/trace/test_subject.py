@@ -136,3 +136,8 @@ def test_guesses(image: FloatArray, subject: str) -> None:
     guess = guess_subject(image)
     assert guess.subject == subject, guess.why
     assert guess.why
+
+
+@pytest.mark.parametrize(("side", "subject"), [(16, "pixel"), (17, "photo")])
+def test_what_has_few_pixels_is_no_photograph(side: int, subject: str) -> None:
+    assert guess_subject(grainy(photograph(side), 4)).subject == subject

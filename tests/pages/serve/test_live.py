@@ -11,7 +11,7 @@ import pytest
 
 import warpsplat
 from warpsplat.fit.progress import Progress, Snapshot
-from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, Live
+from warpsplat.pages.serve.live import LEAST_PAUSE, SHARE, LiveRun
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Slow:
         return warpsplat.starting_scene(np.zeros((16, 16, 3), np.float32), 2)
 
 
-def reports(live: Live, slow: Slow, count: int = 400, step: float = 0.1) -> None:
+def reports(live: LiveRun, slow: Slow, count: int = 400, step: float = 0.1) -> None:
     snapshot = Snapshot(slow.scene, lambda: np.zeros((16, 16, 3), np.float32))
     for number in range(1, count + 1):
         slow.now += step
@@ -38,7 +38,7 @@ def reports(live: Live, slow: Slow, count: int = 400, step: float = 0.1) -> None
 
 def test_pictures_take_a_small_share_of_the_time() -> None:
     slow = Slow()
-    live = Live(clock=slow)
+    live = LiveRun(clock=slow)
     reports(live, slow)
     spent = live.number * slow.cost
     assert live.number > 3 and live.picture.startswith(b"<svg")
@@ -48,21 +48,21 @@ def test_pictures_take_a_small_share_of_the_time() -> None:
 
 def test_cheap_pictures_are_not_too_frequent() -> None:
     slow = Slow(cost=0.0)
-    live = Live(clock=slow)
+    live = LiveRun(clock=slow)
     reports(live, slow, count=100)
     assert live.number == pytest.approx(10 / (LEAST_PAUSE + 0.1), rel=0.2)
 
 
 def test_no_pictures_without_a_reader() -> None:
     slow, changes = Slow(), []
-    live = Live(lambda: False, lambda: changes.append(1), slow)
+    live = LiveRun(lambda: False, lambda: changes.append(1), slow)
     reports(live, slow, count=10)
     assert live.number == 0 and len(changes) == 10
 
 
 def test_the_time_left() -> None:
     slow = Slow(cost=0.0)
-    live = Live(clock=slow)
+    live = LiveRun(clock=slow)
     slow.now = 30.0  # kernels were compiled
     live.begin()
     live.notify("compiling kernels: 3 s")

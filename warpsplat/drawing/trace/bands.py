@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -47,13 +48,16 @@ class _Piece:
         return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
 
 
-def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
+def split_uneven(
+    image: Floats, parts: Parts, noise: float, check: Callable[[], None] = lambda: None
+) -> Parts:
     """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
 
     Args:
         image: premultiplied, 0..255, shape (height, width, 4).
         parts: of the image.
         noise: of flat regions [levels].
+        check: as for ``trace``.
     """
     waiting = _uneven(image, parts, UNEVEN + noise)
     if not waiting:
@@ -65,6 +69,7 @@ def split_uneven(image: Floats, parts: Parts, noise: float) -> Parts:
     done: list[_Piece] = []
     made = len(queue)
     while queue and made < MOST_BANDS:
+        check()
         _, _, piece = heapq.heappop(queue)
         halves = _halves(image, piece)
         gain = piece.error - sum(half.error for half in halves)
@@ -105,21 +110,26 @@ def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
     if mask.sum() < 2 * LEAST_BAND or not np.ptp(own[mask], axis=0).any():
         return []
     pixels = own[mask].astype(np.float64)
-    tone = ((own - pixels.mean(axis=0)) * _direction(pixels)).sum(axis=2)
-    weight = filters.gaussian_blur(mask, SOFT)
-    soft = filters.gaussian_blur((tone * mask).astype(np.float32), SOFT) / np.maximum(weight, 1e-3)
+    tone = np.zeros(mask.shape)
+    tone[mask] = ((pixels - pixels.mean(axis=0)) * _direction(pixels)).sum(axis=1)
+    soft = filters.blurred_within(tone, mask, SOFT)
     light = soft > _threshold(soft[mask])
     for _ in range(2):  # what is too small goes to the other half, where it may join what is too small there
+        settled = True
         for half in (light, ~light):
-            numbers, count = _components(mask & half)
-            small = np.bincount(numbers.reshape(-1), minlength=count + 1) < LEAST_BAND
-            small[0] = False
-            light ^= small[numbers]
+            numbers, boxes = _components(mask & half)
+            small = boxes[:, cv2.CC_STAT_AREA] < LEAST_BAND
+            if small.any():
+                light ^= small[numbers]
+                settled = False
+        if settled:
+            break
     found = []
     for half in (light, ~light):
-        numbers, count = _components(mask & half)
-        for number in range(1, count + 1):
-            found.append(_piece(image, piece, numbers == number))
+        numbers, boxes = _components(mask & half)
+        for number, (left, top, width, height, _) in enumerate(boxes[1:].tolist(), 1):
+            part = numbers[top : top + height, left : left + width] == number
+            found.append(_piece(image, piece.left + left, piece.top + top, part))
     return found
 
 
@@ -134,10 +144,14 @@ def _direction(pixels: Floats) -> Floats:
     return direction / np.sqrt((direction**2).sum())
 
 
-def _components(mask: Bools) -> tuple[Ints, int]:
-    """Return the number of the connected part of each pixel, 0 outside, and how many there are."""
-    count, numbers = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
-    return np.asarray(numbers, np.int32), count - 1
+def _components(mask: Bools) -> tuple[Ints, Ints]:
+    """Return the number of the connected part of each pixel, 0 outside; their left, top, width, height, area.
+
+    Row 0 is what is outside.
+    """
+    _, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    boxes[0, cv2.CC_STAT_AREA] = mask.size
+    return np.asarray(numbers, np.int32), np.asarray(boxes, np.int32)
 
 
 def _threshold(tones: Floats) -> float:
@@ -152,12 +166,9 @@ def _threshold(tones: Floats) -> float:
     return float(edges[1:-1][(below * above * apart**2).argmax()])
 
 
-def _piece(image: Floats, whole: _Piece, mask: Bools) -> _Piece:
-    """Return a part of a piece with the better of a flat colour and a gradient."""
-    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    mask = mask[top : top + height, left : left + width]
-    left, top = left + whole.left, top + whole.top
-    box = image[top : top + height, left : left + width]
+def _piece(image: Floats, left: int, top: int, mask: Bools) -> _Piece:
+    """Return a part of the image, in its bounding box, with the better of a flat colour and a gradient."""
+    box = image[top : top + mask.shape[0], left : left + mask.shape[1]]
     pixels = box[mask].astype(np.float64)
     mean = pixels.mean(axis=0)
     flat = float(((pixels - mean) ** 2).sum())

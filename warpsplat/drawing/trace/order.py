@@ -85,6 +85,23 @@ def has_inside(tree: Tree, marked: Bools) -> Bools:
     return found
 
 
+def enclosed(loops: Loops, marked: Bools) -> Bools:
+    """Find the marked regions that do not reach the border of the image."""
+    found = marked.copy()
+    outer = np.repeat(loops.region, np.diff(loops.first))[loops.others == NO_REGION]
+    found[outer[outer != NO_REGION]] = False
+    return found
+
+
+def in_holes_with(loops: Loops, marked: Bools) -> Bools:
+    """Find the regions that lie in a hole with a marked one, or beside all others with one."""
+    outer = ~loops.is_hole
+    network, region = loops.network[outer], loops.region[outer]
+    found = marked.copy()
+    found[region] = (np.bincount(network, marked[region]) > 0)[network]
+    return found
+
+
 def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
     """Put the regions in the order of painting.
 

@@ -6,6 +6,7 @@ Cracks are directed: the region that a loop bounds lies on their right (the y ax
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,8 +42,6 @@ class Loops:
     """The region that each loop bounds; NO_REGION for the outside of the image. Shape (loop,)."""
     is_hole: Bools
     """Whether the loop bounds a hole of its region, shape (loop,)."""
-    network: Ints
-    """Number of the connected set of cracks that each loop is in, shape (loop,)."""
     vertices: Ints
     """Where each crack begins: x, y; shape (crack, 2)."""
     directions: Ints
@@ -53,17 +52,24 @@ class Loops:
     def __len__(self) -> int:
         return len(self.region)
 
+    @cached_property
+    def network(self) -> Ints:
+        """Number of the connected set of cracks that each of all loops is in, shape (loop,)."""
+        return _networks(self.vertices, self.directions, self.first)
 
-def find_loops(labels: Ints, image: Floats) -> Loops:
-    """Trace the boundaries of all regions.
+
+def find_loops(labels: Ints, image: Floats, chosen: Bools | None = None) -> Loops:
+    """Trace the boundaries of regions.
 
     Args:
         labels: Shape (height, width).
         image: What the labels are of; it decides which of two regions is connected where they cross.
+        chosen: The regions, shape (region,). None: all, and the outside of the image.
     """
     padded = np.pad(labels, 1, constant_values=NO_REGION)
     height, width = labels.shape
     main, other = _passages(labels, image)
+    wanted = None if chosen is None else np.append(chosen, False)  # of NO_REGION, the last
     keys, following, regions, others = [], [], [], []
     for direction in range(4):
         (in_x, in_y), (out_x, out_y) = INSIDE[direction], OUTSIDE[direction]
@@ -76,7 +82,7 @@ def find_loops(labels: Ints, image: Floats) -> Loops:
         within = padded[top : top + rows + 1, left : left + columns + 1]
         mine = within[in_y + 1 :, in_x + 1 :][:rows, :columns]
         theirs = within[out_y + 1 :, out_x + 1 :][:rows, :columns]
-        ys, xs = np.nonzero(mine != theirs)
+        ys, xs = np.nonzero(mine != theirs if wanted is None else (mine != theirs) & wanted[mine])
         mine, theirs = mine[ys, xs], theirs[ys, xs]
         ys, xs = ys + top, xs + left
         end_y, end_x = ys + step_y, xs + step_x
@@ -143,7 +149,6 @@ def _assembled(width: int, keys: Ints, following: Ints, regions: Ints, others: I
         first=starts,
         region=regions[index][starts[:-1]],
         is_hole=_signed_areas(vertices, starts) < 0,
-        network=_networks(vertices, direction, starts, width),
         vertices=vertices,
         directions=direction,
         others=others[index],
@@ -158,12 +163,12 @@ def _signed_areas(vertices: Ints, first: Ints) -> Floats:
     return np.asarray(np.add.reduceat(doubled, first[:-1]) / 2)
 
 
-def _networks(vertices: Ints, directions: Ints, first: Ints, width: int) -> Ints:
+def _networks(vertices: Ints, directions: Ints, first: Ints) -> Ints:
     """Number the sets of loops that are connected by the cracks that they share."""
     loop = np.repeat(np.arange(len(first) - 1), np.diff(first))
     # Both directions of a crack have the same upper left end.
     start = np.minimum(vertices, vertices + STEPS[directions])
-    crack = (start[:, 1] * (width + 1) + start[:, 0]) * 2 + directions % 2
+    crack = (start[:, 1] * (vertices[:, 0].max(initial=0) + 1) + start[:, 0]) * 2 + directions % 2
     pairs = np.unique(loop[np.argsort(crack, kind="stable")].reshape(-1, 2), axis=0)
     sets = Sets(len(first) - 1)
     for a, b in pairs.tolist():

@@ -73,9 +73,7 @@ def _sampled(mask: Bools) -> tuple[Ints, Ints]:
 
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
-    weight = filters.gaussian_blur(mask, BLUR)
-    soft = filters.gaussian_blur(image.astype(np.float32) * mask[..., None], BLUR)
-    soft = soft / np.maximum(weight, 1e-3)[..., None]
+    soft = filters.blurred_within(image, mask, BLUR)
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
     sure[:SPAN], sure[-SPAN:], sure[:, :SPAN], sure[:, -SPAN:] = False, False, False, False
     y, x = _sampled(sure)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -44,12 +45,13 @@ class Regions:
     """Pixels along one of the image."""
 
 
-def find_regions(image: Floats, price: float = 1.0) -> Regions:
+def find_regions(image: Floats, price: float = 1.0, check: Callable[[], None] = lambda: None) -> Regions:
     """Cut an image up into regions.
 
     Args:
         image: Premultiplied sRGB with opacity, 0..255, shape (height, width, 4).
         price: As for ``trace``; below 1, specks that are hardly seen stay.
+        check: As for ``trace``.
     """
     image = np.asarray(image, np.float32)
     noise = noise_of(image)
@@ -58,9 +60,13 @@ def find_regions(image: Floats, price: float = 1.0) -> Regions:
     else:
         image = _smoothed(image, noise)
     noise = min(noise, MOST_NOISE)
+    check()
     seeds = _without_mixed_seeds(image, find_seeds(image, min(noise, MOST_SEED_NOISE)), noise)
-    parts = split_uneven(image, paint_parts(image, seeds, noise), noise)
+    check()
+    parts = split_uneven(image, paint_parts(image, seeds, noise), noise, check)
+    check()
     parts = add_thin_parts(image, parts, noise)
+    check()
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = fill_gaps(image, parts)
     painted, fills = without_orphans(image, painted, fills, sure=parts.labels != NO_REGION)

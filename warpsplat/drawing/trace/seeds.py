@@ -50,8 +50,8 @@ def _noise_of_grey(grey: Floats) -> float:
     ring = dilated(edge, 13) & ~dilated(edge, 5)
     beside = ring if ring.sum() >= 64 else np.ones_like(ring)
     noise, bent = (float(np.percentile(change[beside], NOISE_QUANTILE)) for change in (step, bend))
-    # Steps that are all alike are a gradient; those of noise differ by more than they are.
-    return noise if bent > noise else max(bent / BEND_OF_NOISE - ROUNDING, 0.0)
+    # Steps that are all alike are a gradient, but for a level of rounding; those of noise differ as much.
+    return noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - ROUNDING, 0.0)
 
 
 def find_seeds(image: Floats, noise: float) -> Ints:

@@ -48,7 +48,9 @@ class Layers:
     """The same, -1 for regions under which nothing may lie, shape (region,)."""
     cover: Cover
     holed: Bools
-    """Regions that are or contain something transparent, shape (region,)."""
+    """Regions that are or contain something transparent, or lie in a hole with it, shape (region,)."""
+    has_holes: bool
+    """Whether a path under the cover may meet something transparent."""
 
 
 @dataclass(frozen=True)
@@ -160,10 +162,7 @@ def find_stretches(layers: Layers) -> Stretches:
     above = layers.hiding[np.maximum(others, 0)] > layers.ranks[loops.region[chosen]][owner]
     kinds = np.where(others == NO_REGION, EDGE, np.where(above, HIDDEN, SEEN))
     hidden = np.bincount(owner, kinds != HIDDEN, len(chosen)) == 0
-    # Something transparent may lie anywhere in a hole, not at its border alone.
-    outer = ~loops.is_hole
-    networks = np.bincount(loops.network[outer], layers.holed[loops.region[outer]], loops.network.max() + 1)
-    holed = networks[loops.network[chosen]] > 0
+    holed = np.bincount(owner, layers.holed[others], len(chosen)) > 0
     # What has no boundary that is seen is drawn all the same, if it is no hole. A hole of it is left open, a
     # little smaller than what lies over it, where that is transparent inside.
     kinds[(hidden & ~loops.is_hole[chosen])[owner]] = SEEN
@@ -323,14 +322,8 @@ def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[in
         stretches.middles[index],
         starts[after],
     )
-    loops, last = stretches.layers.loops, stretches.cracks[begin + counts - 1]
-    vertices[inner - 1] = loops.vertices[stretches.cracks[index]]
-    vertices[first[1:] - 2] = vertices[first[1:] - 1] = loops.vertices[last]
-    # Something transparent may lie between regions as well as inside one; what reaches the border of the
-    # image is not between them.
-    outer = np.repeat(loops.region, np.diff(loops.first))[loops.others == NO_REGION]
-    enclosed = stretches.layers.holed.copy()
-    enclosed[outer[outer != NO_REGION]] = False
-    holed = bool(enclosed.any())
-    paths = HiddenPaths(stretches.layers.cover, stretches.rank[hidden], holed, first, goals, vertices)
+    layers, last = stretches.layers, stretches.cracks[begin + counts - 1]
+    vertices[inner - 1] = layers.loops.vertices[stretches.cracks[index]]
+    vertices[first[1:] - 2] = vertices[first[1:] - 1] = layers.loops.vertices[last]
+    paths = HiddenPaths(layers.cover, stretches.rank[hidden], layers.has_holes, first, goals, vertices)
     return dict(zip(hidden.tolist(), paths.corners(), strict=True))

@@ -23,12 +23,15 @@ MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
 FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
 MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
+SMALL = 64 * 64  # [px] of an image that is drawn by sub-pixels if any is thin
+FOREIGN_IN_SMALL = 0.3  # the largest foreign share there
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
 SIGMA = 0.4  # [px] how far sub-pixels attract each other: the deviation of a normal distribution
 WEIGHT = 256  # that stands for 1 where weights are whole numbers
+SPECK = 0.5  # [px] area
 SWEEPS = 4  # in which sub-pixels change places
-MOST_FRAYED = 1.25
+MOST_FRAYED = 1.4
 """Most length of the borders of sub-pixels, over that of the borders of pixels. Where an image is blurred,
 shares are no areas of its pixels, and borders fray."""
 
@@ -57,17 +60,32 @@ def with_sub_pixels(regions: Regions) -> Regions:
     inked = with_inks(regions)
     colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
     painted, mixed = _unmixed(inked, colors)
-    if _foreign_share(inked, mixed, colors) > FOREIGN_SHARE or _thin_share(painted, mixed) < THIN_SHARE:
+    is_small = height * width <= SMALL
+    thin, foreign = _thin_share(painted, mixed), _foreign_share(inked, mixed, colors)
+    if not (thin > 0 if is_small else thin >= THIN_SHARE):
+        return regions
+    if foreign > (FOREIGN_IN_SMALL if is_small else FOREIGN_SHARE):
         return regions
     small = _mapped(painted, mixed, scale)
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
+    _remove_specks(small, mixed, colors, scale)
     fills = colors[small]
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = small
     return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
+
+
+def _remove_specks(small: Ints, mixed: _Mixed, colors: Floats, scale: int) -> None:
+    """Give parts too small to be seen, which thin tips leave, to the other colour of their pixels."""
+    labels = components(small, colors[small])
+    is_speck = np.bincount(labels.ravel()) < SPECK * scale**2
+    place = np.arange(scale)
+    at = mixed.rows[:, None, None] * scale + place[:, None], mixed.columns[:, None, None] * scale + place
+    other = (mixed.first + mixed.second)[:, None, None] - small[at]
+    small[at] = np.where(is_speck[labels[at]], other, small[at])
 
 
 def _border(labels: Ints) -> int:

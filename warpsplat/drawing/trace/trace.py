@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,13 +16,21 @@ from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
-from warpsplat.drawing.trace.order import Tree, bare_ground, find_ranks, find_tree, has_inside
+from warpsplat.drawing.trace.order import (
+    Tree,
+    bare_ground,
+    enclosed,
+    find_ranks,
+    find_tree,
+    has_inside,
+    in_holes_with,
+)
 from warpsplat.drawing.trace.outlines import Boundary, find_boundary
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import Layers, Outline, find_outlines
+from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
@@ -39,40 +48,56 @@ class Traced:
     """``Joint`` of each control point, shape (point,)."""
 
 
-def trace(image: FloatArray, *, most: int | None = None, price: float = 1.0) -> Traced:
+RUNS_TOGETHER = 2000
+"""Parts of outlines to which curves are fitted from one check to the next."""
+
+
+def unchecked() -> None:
+    """Do nothing."""
+
+
+def trace(
+    image: FloatArray, *, most: int | None = None, price: float = 1.0, check: Callable[[], None] = unchecked
+) -> Traced:
     """Trace a drawing.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
         most: Paths at the most; the least visible regions are given up. None: no limit.
         price: Of a byte, over its usual one: the higher, the fewer regions are worth theirs.
+        check: Called now and then; it may raise an exception to give up.
     """
     levels = np.asarray(image, np.float32) * 255
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     height, width = levels.shape[:2]
-    regions = find_regions(levels, price)
+    regions = find_regions(levels, price, check)
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
     regions = worthwhile_regions(regions, price)
-    traced = trace_regions(regions, may_have_ground=is_opaque)
+    traced = trace_regions(regions, may_have_ground=is_opaque, check=check)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
         # Regions of one colour may be one path, so that there may be more of them than paths.
         target = max(2, min(target - 1, int(target * most / len(traced.scene))))
         regions = fewer_regions(regions, target)
-        traced = trace_regions(regions, may_have_ground=is_opaque)
+        traced = trace_regions(regions, may_have_ground=is_opaque, check=check)
     return traced
 
 
-def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
+def trace_regions(
+    regions: Regions, *, may_have_ground: bool = True, check: Callable[[], None] = unchecked
+) -> Traced:
     """Trace the outlines of regions.
 
     Args:
         regions: Of an image.
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
+        check: As for ``trace``.
     """
+    check()
     regions = with_sub_pixels(regions)
+    check()
     nesting, count = find_nesting(regions), len(regions.paint)
     flat = replace(regions, labels=nesting.shown(0)[regions.labels])
     loops = find_loops(flat.labels, flat.image)
@@ -81,14 +106,22 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     unpainted, ground = _ground(regions, tree, may_have_ground=may_have_ground)
     sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
     ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
-    outlines = _outlines(flat, loops, boundary, tree, ranks)
+    layers = _layers(flat, loops, boundary, tree, ranks)
+    check()
+    outlines = find_outlines(layers)
     for depth in range(1, int(nesting.depth.max()) + 1):
+        check()
         layer = replace(regions, labels=nesting.shown(depth)[regions.labels])
-        inner = find_loops(layer.labels, layer.image)
-        drawn = _outlines(layer, inner, find_boundary(inner, layer), find_tree(inner, count), ranks)
-        outlines += [(region, outline) for region, outline in drawn if nesting.depth[region] == depth]
+        inner = find_loops(layer.labels, layer.image, nesting.depth == depth)
+        # Bands hide nothing, so that the cover is the same at all depths.
+        layers = replace(layers, loops=inner, boundary=find_boundary(inner, layer), has_holes=True)
+        outlines += find_outlines(layers)
     runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
-    fitted = iter(fit_polylines(runs, tolerance_of(boundary.offsets, loops, regions)))
+    tolerance, curves = tolerance_of(boundary.offsets, loops, regions), list[Pieces]()
+    for first in range(0, len(runs), RUNS_TOGETHER):
+        check()
+        curves += fit_polylines(runs[first : first + RUNS_TOGETHER], tolerance)
+    fitted = iter(curves)
     found = [
         (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
         for region, outline in outlines
@@ -108,14 +141,16 @@ def trace_regions(regions: Regions, *, may_have_ground: bool = True) -> Traced:
     return _scene(Canvas(width, height, background), merged(shapes))
 
 
-def _outlines(
-    regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints
-) -> list[tuple[int, Outline]]:
-    """Return the contours of regions, which lie on one another by their ranks."""
+def _layers(regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
+    """Return regions as they lie on one another by their ranks."""
     is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
     hiding = np.where(is_opaque, ranks, -1)
+    holed = has_inside(tree, ~is_opaque)
+    # Something transparent may lie between regions as well as inside one; what reaches the border of the
+    # image is not between them.
+    has_holes = bool(enclosed(loops, holed).any())
     cover = Cover(hiding[regions.labels])
-    return find_outlines(Layers(loops, boundary, ranks, hiding, cover, has_inside(tree, ~is_opaque)))
+    return Layers(loops, boundary, ranks, hiding, cover, in_holes_with(loops, holed), has_holes)
 
 
 TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve

@@ -18,7 +18,7 @@ LEAST_PAUSE = 0.4
 """Shortest pause between two pictures [s]."""
 
 
-class Live:
+class LiveRun:
     """The callback of a run. The worker's thread writes, others read: each field is replaced as a whole."""
 
     def __init__(

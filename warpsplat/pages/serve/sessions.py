@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from warpsplat.fit.settings import Settings
-from warpsplat.pages.serve.live import Live
+from warpsplat.pages.serve.live import LiveRun
 from warpsplat.pages.serve.uploads import Upload
 from warpsplat.run.result import Result
 
@@ -68,7 +68,7 @@ class QueuedRun:
     """Shell command that makes the same file."""
     id: str = field(default_factory=lambda: secrets.token_urlsafe(8))
     state: State = "waiting"
-    live: Live = field(default_factory=Live)
+    live: LiveRun = field(default_factory=LiveRun)
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set to end the run with its current shapes."""
     svg: bytes = b""

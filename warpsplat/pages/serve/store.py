@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from warpsplat.fit.settings import Settings
-from warpsplat.pages.serve.live import Live
+from warpsplat.pages.serve.live import LiveRun
 from warpsplat.pages.serve.sessions import Limits, QueuedRun, Refused, Session
 from warpsplat.pages.serve.uploads import Upload
 from warpsplat.run.result import Result
@@ -155,7 +155,7 @@ class Store:
                 raise Refused(429, f"{len(self._queue)} runs are waiting: try again when one is done")
             while sum(1 for _ in self._all_runs()) >= self.limits.runs and self._drop_oldest_run():
                 pass
-            live = Live(lambda: self.is_attended(name), self._changed)
+            live = LiveRun(lambda: self.is_attended(name), self._changed)
             session.runs_started += 1
             number = session.runs_started
             run = QueuedRun(number, image, upload, values, settings, command, live=live)

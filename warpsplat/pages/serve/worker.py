@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warpsplat
 from warpsplat.errors import explain
 from warpsplat.native import release_memory
-from warpsplat.pages.serve.live import Live
+from warpsplat.pages.serve.live import LiveRun
 from warpsplat.pages.serve.sessions import QueuedRun
 from warpsplat.pages.serve.store import Store
 from warpsplat.run.result import Result
@@ -67,7 +67,7 @@ def _outcome(run: QueuedRun, machine: Machine) -> Result | str:
 class _Notices(logging.Handler):
     """Shows the notices of the library on a run's page."""
 
-    def __init__(self, live: Live) -> None:
+    def __init__(self, live: LiveRun) -> None:
         super().__init__()
         self._live = live
 
