@@ -13,6 +13,9 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
+Rows = wp.array[wp.vec2]
+"""Values or control points, or their gradients."""
+
 
 def make_place(name: str, point: Any) -> wp.Kernel:
     """Return the kernel that computes the control points of a form's shapes."""
@@ -71,21 +74,13 @@ def make_gather(name: str, adjoint: Any) -> wp.Kernel:
 
 
 @wp.func
-def curve_point(values: wp.array[wp.vec2], first: wp.int32, count: wp.int32, k: wp.int32):
+def curve_point(values: Rows, first: int, count: int, k: int):
     """Return the control point of a curve, whose values are its points."""
     return values[first + k]
 
 
 @wp.func
-def curve_adjoint(
-    values: wp.array[wp.vec2],
-    first: wp.int32,
-    count: wp.int32,
-    j: wp.int32,
-    points_grad: wp.array[wp.vec2],
-    start: wp.int32,
-    drawn: wp.int32,
-):
+def curve_adjoint(values: Rows, first: int, count: int, j: int, points_grad: Rows, start: int, drawn: int):
     """Return the gradient of a curve's point."""
     return points_grad[start + j]
 

@@ -28,17 +28,26 @@ def tiles_to_pixels(
     tile = offset + i
     y = tile / tiles_x * constants.TILE + constants.QUAD * part
     x0 = tile % tiles_x * constants.TILE
+    last = height - 1
+    if y > last:
+        return
+    # A row below the last one is written to the last one, before that itself: no branch inside of the loop.
+    y1 = wp.min(y + 1, last)
+    y2 = wp.min(y + 2, last)
+    y3 = wp.min(y + 3, last)
+    planes = image_quads.shape[1]
     for x in range(wp.min(width - x0, constants.TILE)):
         k = constants.QUAD * x + part
         red = image_quads[tile, 0, k]
         green = image_quads[tile, 1, k]
         blue = image_quads[tile, 2, k]
         opacity = wp.vec4(1.0, 1.0, 1.0, 1.0)
-        if image_quads.shape[1] == 4:
+        if planes == 4:
             opacity = image_quads[tile, 3, k]
-        for j in range(constants.QUAD):
-            if y + j < height:
-                pixels[y + j, x0 + x] = wp.vec4(red[j], green[j], blue[j], opacity[j])
+        pixels[y3, x0 + x] = wp.vec4(red[3], green[3], blue[3], opacity[3])
+        pixels[y2, x0 + x] = wp.vec4(red[2], green[2], blue[2], opacity[2])
+        pixels[y1, x0 + x] = wp.vec4(red[1], green[1], blue[1], opacity[1])
+        pixels[y, x0 + x] = wp.vec4(red[0], green[0], blue[0], opacity[0])
 
 
 @wp.kernel

@@ -16,9 +16,9 @@ from tests.drawing.trace.drawings import LOGO, draw
 from warpsplat.drawing import draft
 from warpsplat.drawing.draw import announce_fit, announce_trace
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.files.image import boxed
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings
+from warpsplat.portable.filters import boxed
 from warpsplat.scene import Canvas
 
 

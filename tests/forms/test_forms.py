@@ -190,9 +190,17 @@ def test_refining_a_file_of_curves_and_forms() -> None:
     assert result.svg.count("<path") == 2
 
 
+def test_few_shapes_are_fitted_to_fewer_pixels() -> None:
+    settings = [make_settings(shape="ellipse", curves=count) for count in (1, 50, 200)]
+    few, some, many = (each.fine_pixels for each in settings)
+    assert settings[0].coarse_pixels == few < some < many
+    assert make_settings(shape="ellipse", curves=1, fine_pixels=7_000_000).fine_pixels == 7_000_000
+
+
 @pytest.mark.parametrize(
     ("given", "cause"),
     [
+        ({"shape": "ellipse", "curves": "50"}, "curves must be"),
         ({"shape": "square"}, "shape must be one of curve, "),
         ({"shape": "polygon:2"}, "3 to 64 corners"),
         ({"shape": "ellipse", "open": True}, "shape ellipse and open do not go together"),

@@ -147,6 +147,18 @@ def test_when_a_loss_begins(given: tuple[Any, ...], begun: int) -> None:
     assert len(early) == (begun > 0) and len(seen) >= 56 - begun
 
 
+@pytest.mark.parametrize("factor", [1024, 1 / 1024])
+def test_a_loss_of_any_scale_takes_over(factor: float) -> None:
+    """Over four seeds 0.6 dB more to 1.3 dB less; with moments of the squared error up to 7 dB less."""
+
+    def scaled(image: FloatArray, target: FloatArray) -> Both:
+        value, gradient = squared(image, target)
+        return factor * value, factor * gradient
+
+    one, other = (fitted(CustomLoss(each, with_target=True)).score for each in (squared, scaled))
+    assert one and other and other.psnr > one.psnr - 2.5
+
+
 OPTIONS: dict[str, dict[str, Any]] = {
     "transparent": {"image": CLEAR},
     "layered": {"curves": None, "levels": (4, 12), "iterations": 28},

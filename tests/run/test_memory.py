@@ -16,10 +16,11 @@ import warpsplat
 from tests.cli.helpers import one_line, run
 from tests.fit.pictures import picture
 from warpsplat.errors import ExitCode, ResourceError
-from warpsplat.files.image import ImageFacts, boxed, image_facts, load_rows
+from warpsplat.files.image import ImageFacts, image_facts, load_rows
 from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.native import container_limits
+from warpsplat.portable.filters import boxed
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer

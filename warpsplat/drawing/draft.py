@@ -14,7 +14,6 @@ from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, marg
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
 from warpsplat.drawing.trace.trace import Traced, trace, unchecked
 from warpsplat.errors import Stopped
-from warpsplat.files.image import boxed
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import Palette, solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -22,6 +21,7 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import psnr_of_file
 from warpsplat.portable import elementary
+from warpsplat.portable.filters import boxed
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 

@@ -21,7 +21,7 @@ from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.native import messages_hidden
-from warpsplat.portable.filters import resize_area
+from warpsplat.portable.filters import boxed
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray
 
@@ -236,17 +236,6 @@ def _is_transparent(image: Image.Image) -> bool:
 def is_deep(image: Image.Image) -> bool:
     """Return whether an image has one channel of 16 or 32 bits, whose white may depend on all pixels."""
     return image.mode == "F" or image.mode.startswith("I")
-
-
-def boxed(pixels: FloatArray, factor: int) -> FloatArray:
-    """Return means of squares of ``factor`` x ``factor`` px; beyond the border its pixels repeat."""
-    height, width = pixels.shape[:2]
-    size = (-(-width // factor), -(-height // factor))
-    below, right = size[1] * factor - height, size[0] * factor - width
-    whole: npt.NDArray[Any] = pixels
-    if below or right:
-        whole = cv2.copyMakeBorder(whole, 0, below, 0, right, cv2.BORDER_REPLICATE)
-    return resize_area(whole, size)
 
 
 def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:

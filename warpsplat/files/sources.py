@@ -11,9 +11,9 @@ import numpy.typing as npt
 from PIL import Image, ImageOps
 
 from warpsplat.errors import ImageError, cause_of
-from warpsplat.files.image import boxed, check_size, composited, decoded, reduced, without_opacity
+from warpsplat.files.image import check_size, composited, decoded, reduced, without_opacity
 from warpsplat.files.inputs import MAX_INPUT, check_data, input_name, read_input
-from warpsplat.portable.filters import grey
+from warpsplat.portable.filters import boxed, grey
 from warpsplat.scene import FloatArray
 
 

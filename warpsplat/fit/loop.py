@@ -173,11 +173,11 @@ class _Training:
         """Make a step, and report it where that is due."""
         step, settings = self.step, self.step.settings
         state = step.state
-        begins = self.loss_at(settings, state.step) is not step.target.loss
-        if begins:  # moments have another scale
-            state.parameters.rearrange(np.arange(0), state.scene())
+        before, begins = step, self.loss_at(settings, state.step) is not step.target.loss
         if begins or phase_at(settings, self.plan, state.step) is not step.target.phase:
             self.step = step = Step(state, settings, self.target(settings, state.step))
+        if begins:
+            state.parameters.scale_moments(step.slope() / max(before.slope(), 1e-12))
         if self.palette and not state.rounding and self.palette.is_due(state):
             self.palette.choose(step)
         step.advance()

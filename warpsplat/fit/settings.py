@@ -83,6 +83,9 @@ POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
 FORM_POINT_RATE, FORM_SURPLUS = 6.0, 2.0
 """Learning rate of the values of forms [px], and their ``Density.surplus``."""
 
+FORM_PIXELS = 8000
+"""Most pixels of the image in the last iterations for each shape of a form: more show nothing new."""
+
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
@@ -477,6 +480,10 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
         rates["points"] = FORM_POINT_RATE
         density = replace(preset.density, surplus=FORM_SURPLUS)
         preset = replace(preset, texture=0.0, density=density)
+        curves = given.get("curves")
+        if isinstance(curves, int):  # else none, or refused later
+            fine = max(preset.coarse_pixels, FORM_PIXELS * curves)
+            preset = replace(preset, fine_pixels=min(preset.fine_pixels, fine))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE
     if given.get("opaque"):

@@ -25,6 +25,7 @@ from warpsplat.rendering.forms import record_gather
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, capture
 from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import FloatArray
 
 
@@ -180,6 +181,13 @@ class Step:
         """Return the mean squared error of the last render. Reads a number per tile back."""
         self.programs[1].run()
         return self.loss_target.mean_square()
+
+    def slope(self) -> float:
+        """Render, and return the length of the loss's gradient by the image. Reads the gradient back."""
+        self.render()
+        self.programs[1].run()
+        square = squares(read_tiles(self.renderer.film.buffers.image_grad))
+        return float(np.sqrt(square.sum(dtype="float64")))
 
     def psnr(self) -> float:
         """Return the PSNR of the last step's loss, at its size [dB]: that of the render, or once the file has

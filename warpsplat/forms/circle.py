@@ -8,7 +8,7 @@ import warp as wp
 from warpsplat.forms import Array
 from warpsplat.forms.frame import QUARTERS, table_of
 from warpsplat.forms.text import element_of
-from warpsplat.kernels.forms import make_gather, make_place
+from warpsplat.kernels.forms import Rows, make_gather, make_place
 
 VALUES = 2
 TAGS = ("circle",)
@@ -28,21 +28,13 @@ def outline(values: Array, closed: bool) -> Array:
 
 
 @wp.func
-def point(values: wp.array[wp.vec2], first: wp.int32, count: wp.int32, k: wp.int32):
+def point(values: Rows, first: int, count: int, k: int):
     """Return a control point of an arc."""
     return values[first] + values[first + 1][0] * wp.vec2(AROUND[k, 0], AROUND[k, 1])
 
 
 @wp.func
-def adjoint(
-    values: wp.array[wp.vec2],
-    first: wp.int32,
-    count: wp.int32,
-    j: wp.int32,
-    points_grad: wp.array[wp.vec2],
-    start: wp.int32,
-    drawn: wp.int32,
-):
+def adjoint(values: Rows, first: int, count: int, j: int, points_grad: Rows, start: int, drawn: int):
     """Return the gradient of the centre, or of the radius."""
     total = wp.vec2(0.0, 0.0)
     for k in range(drawn):

@@ -13,7 +13,7 @@ import warp as wp
 
 from warpsplat.forms import Array
 from warpsplat.kernels import constants
-from warpsplat.kernels.forms import make_gather, make_place
+from warpsplat.kernels.forms import Rows, make_gather, make_place
 from warpsplat.portable import elementary
 
 HANDLE = 4 * (math.sqrt(2) - 1) / 3
@@ -53,22 +53,14 @@ def make_frame(name: str, outline: Array) -> tuple[wp.Kernel, wp.Kernel]:
     table = table_of(outline)
 
     @wp.func(name=f"{name}_point", module="unique")
-    def point(values: wp.array[wp.vec2], first: wp.int32, count: wp.int32, k: wp.int32):
+    def point(values: Rows, first: int, count: int, k: int):
         """Return where a point of the outline lies."""
         along = values[first + 1]
         share = values[first + 2][0] / wp.max(wp.length(along), constants.EPSILON)
         return values[first] + table[k, 0] * along + (share * table[k, 1]) * wp.vec2(-along[1], along[0])
 
     @wp.func(name=f"{name}_adjoint", module="unique")
-    def adjoint(
-        values: wp.array[wp.vec2],
-        first: wp.int32,
-        count: wp.int32,
-        j: wp.int32,
-        points_grad: wp.array[wp.vec2],
-        start: wp.int32,
-        drawn: wp.int32,
-    ):
+    def adjoint(values: Rows, first: int, count: int, j: int, points_grad: Rows, start: int, drawn: int):
         """Return the gradient of the centre, the first axis u, or half of the second one, b.
 
         The second axis is b n, where n is the first one's direction e, turned: dn = -e (n . du) / |u|.

@@ -7,7 +7,7 @@ import warp as wp
 
 from warpsplat.forms import Array
 from warpsplat.forms.text import element_of, text_of
-from warpsplat.kernels.forms import make_gather, make_place
+from warpsplat.kernels.forms import Rows, make_gather, make_place
 from warpsplat.portable import elementary
 
 VALUES = 0
@@ -29,7 +29,7 @@ def outline(values: Array, closed: bool) -> Array:
 
 
 @wp.func
-def point(values: wp.array[wp.vec2], first: wp.int32, count: wp.int32, k: wp.int32):
+def point(values: Rows, first: int, count: int, k: int):
     """Return a vertex, or a point at a third of a side."""
     i = k / 3
     share = float(k - 3 * i) / 3.0
@@ -37,15 +37,7 @@ def point(values: wp.array[wp.vec2], first: wp.int32, count: wp.int32, k: wp.int
 
 
 @wp.func
-def adjoint(
-    values: wp.array[wp.vec2],
-    first: wp.int32,
-    count: wp.int32,
-    j: wp.int32,
-    points_grad: wp.array[wp.vec2],
-    start: wp.int32,
-    drawn: wp.int32,
-):
+def adjoint(values: Rows, first: int, count: int, j: int, points_grad: Rows, start: int, drawn: int):
     """Return the gradient of a vertex by the points of its two sides."""
     total = points_grad[start + 3 * j]
     if 3 * j + 2 < drawn:

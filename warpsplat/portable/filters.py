@@ -136,6 +136,16 @@ def resize_area(image: Floats, size: tuple[int, int]) -> Floats:
     return _resized(image, size, _area_taps)
 
 
+def boxed(image: Floats, factor: int) -> Floats:
+    """Return means of squares of ``factor`` x ``factor`` px; beyond the border its pixels repeat."""
+    height, width = image.shape[:2]
+    size = (-(-width // factor), -(-height // factor))
+    below, right = size[1] * factor - height, size[0] * factor - width
+    if below or right:
+        image = np.pad(image, ((0, below), (0, right), *[(0, 0)] * (image.ndim - 2)), mode="edge")
+    return resize_area(image, size)
+
+
 def resize_linear(image: Floats, size: tuple[int, int]) -> Floats:
     """Return an image at another size (width, height) [px], interpolated linearly at pixel centres."""
     return _resized(image, size, functools.partial(_point_taps, cubic=False))

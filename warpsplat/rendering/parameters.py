@@ -311,6 +311,12 @@ class Parameters:
                 array.assign(np.where(rows[:, None], values, array.numpy()).astype(np.float32))
         self.arrays["ages"].assign(np.where(shapes, 0, self.arrays["ages"].numpy()).astype(np.int32))
 
+    def scale_moments(self, factor: float) -> None:
+        """Scale Adam's moments to those of gradients ``factor`` times as long."""
+        for group in self.groups.values():
+            group.moment1.assign(np.float32(factor) * group.moment1.numpy())
+            group.moment2.assign(np.float32(factor * factor) * group.moment2.numpy())
+
     def rearrange(self, keep: IndexArray, added: Scene) -> None:
         """Keep the shapes ``keep`` (in that order) with their moments and ages, put ``added`` in front.
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
-from warpsplat.files.image import boxed
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, make_settings, solid_color
 from warpsplat.native import release_memory
+from warpsplat.portable.filters import boxed
 from warpsplat.run.memory import Reduction, factor_for, facts_of, mask_factor, reduction_for
 from warpsplat.run.result import job_key
 from warpsplat.scene import FloatArray, Kind, Scene

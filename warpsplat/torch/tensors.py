@@ -90,7 +90,11 @@ class SceneTensors:
 
     def drawn(self) -> dict[str, torch.Tensor]:
         """Return the attributes that some shape has, by name, in float32."""
-        return {attribute.name: self.value(attribute) for attribute in attributes_of(self.layout)}
+        return {attribute.name: self.value(attribute) for attribute in self._attributes}
+
+    @functools.cached_property
+    def _attributes(self) -> tuple[Attribute, ...]:
+        return attributes_of(self.layout)
 
     def scene(self) -> Scene:
         """Return a scene of the current values, clamped to what a file can hold.
