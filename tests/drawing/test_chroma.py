@@ -29,7 +29,7 @@ def as_jpeg(image: FloatArray, subsampling: int) -> FloatArray:
     Image.fromarray(np.round(image * 255).astype(np.uint8)).save(
         file, "jpeg", quality=75, subsampling=subsampling
     )
-    return np.asarray(Image.open(file), np.float32) / 255
+    return np.asarray(Image.open(file), np.float32) / np.float32(255)
 
 
 @pytest.fixture(scope="module")

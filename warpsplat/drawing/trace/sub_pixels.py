@@ -71,7 +71,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
     _remove_specks(small, mixed, colors, scale)
-    rows, columns = np.indices(small.shape) // scale
+    rows, columns = (place // scale for place in np.indices(small.shape))
     fills = _colors_at(shown, small, rows, columns)
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
