@@ -20,6 +20,8 @@ RAMP = wp.constant(0)
 CHAIN = wp.constant(1)
 GENERAL = wp.constant(2)
 
+NAMES = {RAMP: "ramp", CHAIN: "chain", GENERAL: "gradient"}
+
 frame: Any = wp.types.vector(length=6, dtype=wp.float32)
 """Origin, first axis, second axis."""
 

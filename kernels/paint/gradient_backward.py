@@ -8,6 +8,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint.gradient import (
     GENERAL,
+    NAMES,
     RAMP,
     TINY,
     Gradients,
@@ -22,7 +23,6 @@ from warpsplat.kernels.paint.gradient import (
     to_unit_adjoint,
 )
 from warpsplat.kernels.paint.gradient_forward import (
-    NAMES,
     STEEP,
     roots,
     rows,

@@ -13,8 +13,8 @@ import warp as wp
 
 from warpsplat.kernels import constants
 from warpsplat.kernels.paint.gradient import (
-    CHAIN,
     GENERAL,
+    NAMES,
     RAMP,
     Gradients,
     between_stops,
@@ -102,9 +102,6 @@ def color_chain(
     paint_columns[slot, 1, x] = green
     paint_columns[slot, 2, x] = blue
     paint_columns[slot, 3, x] = opacity
-
-
-NAMES = {RAMP: "ramp", CHAIN: "chain", GENERAL: "gradient"}
 
 
 @functools.cache

@@ -70,9 +70,10 @@ class Painting:
         """Record frames and stops, and pictures -> colours of the pixels of visible slots that have such."""
         column, kernels = self._backend.column, []
         if self.has_gradients:
-            from warpsplat.kernels.paint import gradient_forward  # takes long to import
+            from warpsplat.kernels.paint.gradient import NAMES
+            from warpsplat.kernels.paint.gradient_forward import make_forward  # takes long to import
 
-            kernels += [gradient_forward.make_forward(column, case) for case in gradient_forward.NAMES]
+            kernels += [make_forward(column, case) for case in NAMES]
         if self._pictures:
             from warpsplat.kernels.paint import picture
 
@@ -92,10 +93,11 @@ class Painting:
         """Record gradients by slot -> gradients of colours, opacities, frames and stops."""
         shapes, column = self._shape_count, self._backend.column
         if self.has_gradients:
-            from warpsplat.kernels.paint import gradient_backward
+            from warpsplat.kernels.paint.gradient import NAMES
+            from warpsplat.kernels.paint.gradient_backward import make_backward
 
-            for case in gradient_backward.NAMES:
-                kernel = gradient_backward.make_backward(column, case)
+            for case in NAMES:
+                kernel = make_backward(column, case)
                 program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
         if self._backend.lanes == 1:
             program.launch(flat.flat_backward, shapes, *self._sources, split=True)

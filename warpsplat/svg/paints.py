@@ -32,7 +32,7 @@ def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]
     owners = {}
     prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
     painted = np.flatnonzero(np.isin(scene.paint, GRADIENTS)).tolist()
-    frames = gradient_frames(scene, per_pixel) if painted else []
+    frames = gradient_frames(scene, per_pixel) if painted else scene.frames
     for shape in painted:
         body = _gradient(scene, shape, frames[shape], per_pixel)
         owners[shape] = elements.setdefault(body, f"{prefix}{len(elements)}")

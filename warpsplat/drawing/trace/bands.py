@@ -151,7 +151,7 @@ def _components(mask: Bools) -> tuple[Ints, Ints]:
     """
     _, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     boxes[0, cv2.CC_STAT_AREA] = mask.size
-    return numbers, boxes
+    return np.asarray(numbers, np.int32), np.asarray(boxes, np.int32)
 
 
 def _threshold(tones: Floats) -> float:
