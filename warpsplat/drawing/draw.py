@@ -49,7 +49,8 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     most = None if settings.simplify else settings.curves
     announce_trace(problem)
     traced = trace_regions(problem, run, most)
-    announce_fit(traced, problem)
+    if not run.over():
+        announce_fit(traced, problem)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
     finish = partial(
