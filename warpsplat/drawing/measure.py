@@ -144,9 +144,11 @@ class Measure:
         if is_shaded(drawing.scene).any():
             self._near.follow(np.arange(viewport.tile_count))
         self._tiles = self._near.tiles
+        # A slice takes all of them without a copy.
+        self._index = slice(None) if len(self._tiles) == viewport.tile_count else self._tiles
         goal = to_tiles(target)
-        self._target = goal[self._tiles]
-        self._inside = read_tiles(self._renderer.film.buffers.inside)[self._tiles, None]
+        self._target = goal[self._index]
+        self._inside = read_tiles(self._renderer.film.buffers.inside)[self._index, None]
         self._grad = np.zeros_like(goal)
         self._render(points)
         elsewhere = np.ones(len(goal), np.bool_)
@@ -177,9 +179,8 @@ class Measure:
     def error(self, points: Floats) -> tuple[float, Floats]:
         """Return the mean squared error with the outlines at ``points``, and the part around each cubic."""
         self._render(points)
-        self._residual = (
-            read_tiles(self._renderer.film.buffers.image)[self._tiles] - self._target
-        ) * self._inside
+        self._residual = read_tiles(self._renderer.film.buffers.image)[self._index] - self._target
+        self._residual *= self._inside
         parts = squares(self._residual, axis=1)
         total = self._rest + float(parts.sum(dtype=np.float64))
         return total * self._scale, self._near.sums(parts) * self._scale
@@ -274,7 +275,7 @@ class Measure:
         if not self._is_fresh:
             self._renderer.forward()
         self._is_fresh = False
-        self._grad[self._tiles] = image_grad
+        self._grad[self._index] = image_grad
         write_tiles(self._renderer.film.buffers.image_grad, self._grad)
         self._renderer.backward()
 
@@ -282,9 +283,13 @@ class Measure:
         """Return the derivative of the mean squared error by the image."""
         if residual.shape[1] == 3:
             return residual * np.float32(2 * self._scale)
-        color, opacity = residual[:, :3], residual[:, 3:]
-        back = 3 * opacity - color.sum(axis=1, keepdims=True)
-        return np.concatenate([2 * color - opacity, back], axis=1) * np.float32(self._scale)
+        red, green, blue, opacity = np.moveaxis(residual, 1, 0)
+        found = np.empty_like(residual)
+        for channel, color in enumerate((red, green, blue)):
+            found[:, channel] = 2 * color - opacity
+        found[:, 3] = 3 * opacity - (red + green + blue)
+        found *= np.float32(self._scale)
+        return found
 
     def _blurred(self, residual: FloatArray) -> FloatArray:
         """Return ``residual`` blurred by 1/4, 1/2, 1/4 along both axes; beyond its tiles there is none."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, bounding_boxes
+from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.portable import filters
@@ -117,8 +117,10 @@ def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
     for _ in range(2):  # what is too small goes to the other half, where it may join what is too small there
         settled = True
         for half in (light, ~light):
-            numbers, boxes = _components(mask & half)
-            small = boxes[:, cv2.CC_STAT_AREA] < LEAST_BAND
+            inside = mask & half
+            _, numbers = cv2.connectedComponents(inside.astype(np.uint8), connectivity=4)
+            small = np.bincount(numbers[inside], minlength=1) < LEAST_BAND
+            small[0] = False
             if small.any():
                 light ^= small[numbers]
                 settled = False
@@ -126,7 +128,9 @@ def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
             break
     found = []
     for half in (light, ~light):
-        numbers, boxes = _components(mask & half)
+        _, numbers, boxes, _ = cv2.connectedComponentsWithStats(
+            (mask & half).astype(np.uint8), connectivity=4
+        )
         for number, (left, top, width, height, _) in enumerate(boxes[1:].tolist(), 1):
             part = numbers[top : top + height, left : left + width] == number
             found.append(_piece(image, piece.left + left, piece.top + top, part))
@@ -142,16 +146,6 @@ def _direction(pixels: Floats) -> Floats:
         direction = direction / np.abs(direction).max()
         direction = (matrix * direction).sum(axis=1)
     return direction / np.sqrt((direction**2).sum())
-
-
-def _components(mask: Bools) -> tuple[Ints, Ints]:
-    """Return the number of the connected part of each pixel, 0 outside; their left, top, width, height, area.
-
-    Row 0 is what is outside.
-    """
-    _, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
-    boxes[0, cv2.CC_STAT_AREA] = mask.size
-    return np.asarray(numbers, np.int32), np.asarray(boxes, np.int32)
 
 
 def _threshold(tones: Floats) -> float:

@@ -69,7 +69,7 @@ def find_loops(labels: Ints, image: Floats, chosen: Bools | None = None) -> Loop
     padded = np.pad(labels, 1, constant_values=NO_REGION)
     height, width = labels.shape
     main, other = _passages(labels, image)
-    wanted = None if chosen is None else np.append(chosen, False)  # of NO_REGION, the last
+    wanted = None if chosen is None else np.append(chosen, False)[padded]  # NO_REGION is the last
     keys, following, regions, others = [], [], [], []
     for direction in range(4):
         (in_x, in_y), (out_x, out_y) = INSIDE[direction], OUTSIDE[direction]
@@ -82,7 +82,10 @@ def find_loops(labels: Ints, image: Floats, chosen: Bools | None = None) -> Loop
         within = padded[top : top + rows + 1, left : left + columns + 1]
         mine = within[in_y + 1 :, in_x + 1 :][:rows, :columns]
         theirs = within[out_y + 1 :, out_x + 1 :][:rows, :columns]
-        ys, xs = np.nonzero(mine != theirs if wanted is None else (mine != theirs) & wanted[mine])
+        differ = mine != theirs
+        if wanted is not None:
+            differ &= wanted[top + in_y + 1 :, left + in_x + 1 :][:rows, :columns]
+        ys, xs = np.nonzero(differ)
         mine, theirs = mine[ys, xs], theirs[ys, xs]
         ys, xs = ys + top, xs + left
         end_y, end_x = ys + step_y, xs + step_x

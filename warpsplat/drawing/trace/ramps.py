@@ -73,12 +73,14 @@ def _sampled(mask: Bools) -> tuple[Ints, Ints]:
 
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
-    soft = filters.blurred_within(image, mask, BLUR)
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
     sure[:SPAN], sure[-SPAN:], sure[:, :SPAN], sure[:, -SPAN:] = False, False, False, False
     y, x = _sampled(sure)
-    slope_x = (soft[y, x + SPAN] - soft[y, x - SPAN]) / (2 * SPAN) if len(y) else np.zeros((0, 1))
-    slope_y = (soft[y + SPAN, x] - soft[y - SPAN, x]) / (2 * SPAN) if len(y) else np.zeros((0, 1))
+    if len(y) < LEAST_SLOPES:  # as in thin bands
+        return np.zeros((0, 2)), np.zeros((0, 2, 1))
+    soft = filters.blurred_within(image, mask, BLUR)
+    slope_x = (soft[y, x + SPAN] - soft[y, x - SPAN]) / (2 * SPAN)
+    slope_y = (soft[y + SPAN, x] - soft[y - SPAN, x]) / (2 * SPAN)
     return np.stack([x, y], axis=1) + 0.5, np.stack([slope_x, slope_y], axis=1)
 
 

@@ -193,11 +193,16 @@ def _matching_color(thin: _ThinPart, flat: _FlatColors, near: list[int], limit: 
     if not flat.numbers:
         return flat.total
     top = thin.least_mixed(0.5)
-    share, off = _shares(thin.colors[top], thin.bases[top], flat.colors)
-    fits = np.count_nonzero(off <= limit, axis=0) >= int(MATCHING * (len(off) - 1))
+    pixels, bases = thin.colors[top], thin.bases[top]
+    most = len(pixels) - int(MATCHING * (len(pixels) - 1))  # pixels that a colour may miss
+    few = slice(0, 2 * most)  # which tell of most colours that they miss too many
+    likely = np.flatnonzero((_shares(pixels[few], bases[few], flat.colors)[1] > limit).sum(axis=0) <= most)
+    share, off = _shares(pixels, bases, flat.colors[likely])
+    fits, largest = np.zeros(len(flat.colors), np.bool_), np.zeros(len(flat.colors), share.dtype)
+    fits[likely] = (off > limit).sum(axis=0) <= most
+    largest[likely] = share.max(axis=0)
     if fits.any():
-        fits[fits] = np.quantile(off[:, fits], MATCHING, axis=0) <= limit
-    largest = share.max(axis=0)
+        fits[fits] = np.quantile(off[:, fits[likely]], MATCHING, axis=0) <= limit
     clear = fits & (largest >= CLEARLY)
     if clear.any():
         return flat.numbers[int(np.where(clear, largest, -np.inf).argmax())]
