@@ -71,8 +71,8 @@ def with_sub_pixels(regions: Regions) -> Regions:
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
     _remove_specks(small, mixed, colors, scale)
-    rows, columns = (place // scale for place in np.indices(small.shape))
-    fills = _colors_at(shown, small, rows, columns)
+    places = np.indices(small.shape) // scale
+    fills = _colors_at(shown, small, places[0], places[1])
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
