@@ -28,11 +28,12 @@ SPREADS = {Spread.PAD: "", Spread.REFLECT: ' spreadMethod="reflect"', Spread.REP
 
 def gradients(scene: Scene, per_pixel: float) -> tuple[list[str], dict[int, str]]:
     """Return gradient elements, each once, and the identifier of each shape's gradient."""
-    elements: dict[str, str] = {}
-    owners = {}
-    prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
     painted = np.flatnonzero(np.isin(scene.paint, GRADIENTS)).tolist()
-    frames = gradient_frames(scene, per_pixel) if painted else scene.frames
+    if not painted:
+        return [], {}
+    elements: dict[str, str] = {}
+    owners, frames = {}, gradient_frames(scene, per_pixel)
+    prefix = unused("g", "".join(picture.markup for picture in scene.pictures))
     for shape in painted:
         body = _gradient(scene, shape, frames[shape], per_pixel)
         owners[shape] = elements.setdefault(body, f"{prefix}{len(elements)}")

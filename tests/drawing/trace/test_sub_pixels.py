@@ -69,6 +69,20 @@ def test_tips_are_no_parts_of_their_own() -> None:
     assert len(found.paint) == 2
 
 
+def test_letters_beside_a_gradient_are_mapped_too() -> None:
+    shade = (
+        '<linearGradient id="g"><stop stop-color="#c05010"/><stop offset="1" stop-color="#f0b040"/>'
+        "</linearGradient>"
+        '<rect y="20" width="36" height="20" fill="url(#g)"/>'
+    )
+    image = draw_exactly(ground("#ffffff", 36, 40) + shade + LETTERS, 36, 40)
+    mapped = with_sub_pixels(find_regions(levels(image)))
+    assert mapped.scale == 4
+    shown = mapped.fills.reshape(40, 4, 36, 4, 4).mean(axis=(1, 3))
+    assert np.abs(shown - levels(image)).max(axis=2).mean() <= 255 * 0.01
+    assert sum(mapped.colorings[k].ramp is not None for k in np.unique(mapped.paint)) == 1
+
+
 def test_broad_shapes_keep_their_pixels() -> None:
     image = draw_exactly(
         ground("#ffffff", 40, 40) + '<circle cx="20" cy="20" r="12.3" fill="#a02030"/>', 40, 40

@@ -6,10 +6,9 @@ The functions take and return ``painted``, the number of each pixel's colouring,
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, components
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
 from warpsplat.drawing.trace.palette import Parts
 
@@ -35,12 +34,7 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
     fills[rows[known], columns[known]] = mixtures.color[known]
     empty = labels == NO_REGION
     if empty.any():
-        _, nearest = cv2.distanceTransformWithLabels(
-            empty.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        source = np.zeros(int(nearest.max()) + 1, np.int64)
-        source[nearest[~empty]] = np.flatnonzero(~empty)
-        take = source[nearest[empty]]
+        take = nearest_in(~empty)[empty]
         labels[empty] = labels.reshape(-1)[take]
         fills[empty] = fills.reshape(-1, fills.shape[2])[take]
     return parts.paint[labels], fills

@@ -167,3 +167,13 @@ def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
     mean = sum(soft[rows + down, columns + right] for down in (0, 1) for right in (0, 1)) / 4
     main, other = np.abs((a + d) / 2 - mean).max(axis=1), np.abs((b + c) / 2 - mean).max(axis=1)
     return np.asarray(main >= other)
+
+
+def nearest_in(mask: Bools) -> Ints:
+    """Return the flat index of the pixel of a mask that is nearest to each one, shape (height, width)."""
+    _, labels = cv2.distanceTransformWithLabels(
+        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    source = np.zeros(int(labels.max()) + 1, np.int64)
+    source[labels[mask]] = np.flatnonzero(mask)
+    return np.asarray(source[labels])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats, Ints, channel_max, components, dilated
+from warpsplat.drawing.trace.grids import Floats, Ints, channel_max, components, dilated, nearest_in
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.mixtures import DISTANCE_COST, MIXED
 from warpsplat.drawing.trace.regions import Regions
@@ -23,7 +23,7 @@ MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
 FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
 MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
-SMALL = 64 * 64  # [px] of an image that is drawn by sub-pixels if any is thin
+SMALL = 64 * 64  # [px] of an image without gradients that is drawn by sub-pixels if any is thin
 FOREIGN_IN_SMALL = 0.3  # the largest foreign share there
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
@@ -54,14 +54,15 @@ def with_sub_pixels(regions: Regions) -> Regions:
     height, width = regions.labels.shape
     scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
     used = np.unique(regions.paint).tolist()
-    is_flat = all(regions.colorings[k].ramp is None and not regions.colorings[k].is_band for k in used)
-    if scale == 1 or regions.noise or not is_flat or len(used) > MOST_COLORS:
+    has_bands = any(regions.colorings[k].is_band for k in used)
+    if scale == 1 or regions.noise or has_bands or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
     colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
-    painted, mixed = _unmixed(inked, colors)
-    is_small = height * width <= SMALL
-    thin, foreign = _thin_share(painted, mixed), _foreign_share(inked, mixed, colors)
+    shown = _shown(inked)
+    painted, mixed = _unmixed(inked, shown)
+    is_small = height * width <= SMALL and all(regions.colorings[k].ramp is None for k in used)
+    thin, foreign = _thin_share(painted, mixed), _foreign_share(inked, mixed, shown)
     if not (thin > 0 if is_small else thin >= THIN_SHARE):
         return regions
     if foreign > (FOREIGN_IN_SMALL if is_small else FOREIGN_SHARE):
@@ -70,7 +71,8 @@ def with_sub_pixels(regions: Regions) -> Regions:
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
     _remove_specks(small, mixed, colors, scale)
-    fills = colors[small]
+    places = np.indices(small.shape) // scale
+    fills = _colors_at(shown, small, places[0], places[1])
     image = filters.box_blur(filters.box_blur(fills, 3), 3)
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
@@ -93,8 +95,29 @@ def _border(labels: Ints) -> int:
     return sum(int(np.count_nonzero(np.diff(labels, axis=axis))) for axis in (0, 1))
 
 
-def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
-    """Return the colouring with the larger share in each pixel, and the mixed pixels; ``colors``: of all."""
+def _shown(regions: Regions) -> dict[int, Floats]:
+    """Return each colouring over the image, shape (height, width, 4): gradients by the nearest pixel."""
+    painted, shown = regions.paint[regions.labels], {}
+    for k in np.unique(painted).tolist():
+        coloring = regions.colorings[k]
+        if coloring.ramp is None:
+            shown[k] = np.broadcast_to(coloring.color.astype(np.float32), regions.image.shape)
+        else:
+            shown[k] = regions.fills.reshape(-1, 4)[nearest_in(painted == k)]
+    return shown
+
+
+def _colors_at(shown: dict[int, Floats], which: Ints, rows: Ints, columns: Ints) -> Floats:
+    """Return the colours of the colourings ``which`` at pixels, shape (..., 4)."""
+    found = np.empty((*which.shape, 4), np.float32)
+    for k in np.unique(which).tolist():
+        own = which == k
+        found[own] = shown[k][rows[own], columns[own]]
+    return found
+
+
+def _unmixed(regions: Regions, shown: dict[int, Floats]) -> tuple[Ints, _Mixed]:
+    """Return the colouring with the larger share in each pixel, and the mixed pixels."""
     painted = regions.paint[regions.labels]
     numbers = np.unique(painted).tolist()
     distances = {k: filters.distance(painted != k) for k in numbers}
@@ -103,25 +126,27 @@ def _unmixed(regions: Regions, colors: Floats) -> tuple[Ints, _Mixed]:
     for i, a in enumerate(numbers):
         for b in numbers[i + 1 :]:
             rows, columns = np.nonzero((distances[a] < NEAR) & (distances[b] < NEAR))
-            between, away = colors[a] - colors[b], regions.image[rows, columns] - colors[b]
-            t = np.clip((away * between).sum(axis=1) / max(float((between**2).sum()), 1e-6), 0, 1)
+            one, other = shown[a][rows, columns], shown[b][rows, columns]
+            between, away = one - other, regions.image[rows, columns] - other
+            t = np.clip((away * between).sum(axis=1) / np.maximum((between**2).sum(axis=1), 1e-6), 0, 1)
             off = channel_max(np.abs(away - t[:, None] * between))
             off += DISTANCE_COST * (distances[a] + distances[b])[rows, columns]
             better = off < cost[rows, columns]
             at = rows[better], columns[better]
             cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
     most = np.where(share >= 0.5, first, second)
-    is_pure = channel_max(np.abs(regions.image - colors[most])) <= MIXED
+    is_pure = channel_max(np.abs(regions.image - _colors_at(shown, most, *np.indices(most.shape)))) <= MIXED
     rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE) & ~is_pure)
     at = rows, columns
     return most, _Mixed(rows, columns, first[at], second[at], share[at])
 
 
-def _foreign_share(regions: Regions, mixed: _Mixed, colors: Floats) -> float:
+def _foreign_share(regions: Regions, mixed: _Mixed, shown: dict[int, Floats]) -> float:
     """Return the share of the mixed pixels that are not mixed of two colours."""
     share = mixed.share[:, None]
-    expected = share * colors[mixed.first] + (1 - share) * colors[mixed.second]
-    off = channel_max(np.abs(regions.image[mixed.rows, mixed.columns] - expected))
+    at = mixed.rows, mixed.columns
+    one, other = (_colors_at(shown, which, *at) for which in (mixed.first, mixed.second))
+    off = channel_max(np.abs(regions.image[at] - share * one - (1 - share) * other))
     return float((off > MIXED).mean()) if len(off) else 0.0
 
 
