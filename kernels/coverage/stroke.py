@@ -9,8 +9,8 @@ direction n of the nearest point (h half the width): exact for straight strokes 
 Adjoint: moving the nearest segment's ends by v_a, v_b changes d by -n . ((1 - t) v_a + t v_b), t the nearest
 point's parameter (which is at a minimum, or at an end). The turning of n is left out: what it takes from a
 pixel it gives to the next. With it, gradients agree with central differences by 0.01 px (within .02 for .5 on
-strokes thinner than a pixel), but no better by the 0.3 px that optimisers take, and fits end lower or higher by
-five percent.
+strokes thinner than a pixel), but no better by the 0.3 px that optimisers take, and fits end lower or
+higher by some five percent.
 """
 
 import functools
