@@ -89,11 +89,9 @@ def find_reach(
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
-    reach: wp.array[
-        wp.vec2
-    ],  # [vertex_capacity / EDGE_BLOCK] px; least and largest y of the edges of a block
+    reach: wp.array[wp.vec2],  # [vertex_capacity / EDGE_BLOCK] px; least and largest y
 ):
-    """Find between which heights the edges of each block lie. One thread a block."""
+    """Find the least and the largest y of the edges of each block. One thread a block."""
     block = offset + wp.tid()
     low = float(constants.REACH_MAX)
     high = -float(constants.REACH_MAX)

@@ -11,8 +11,9 @@ import numpy as np
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
+from warpsplat.drawing.trace.grids import unchecked
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
-from warpsplat.drawing.trace.trace import Traced, trace, unchecked
+from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import Palette, solid_shapes
@@ -31,9 +32,11 @@ LEAST_ORIGINAL_SIDE = 96
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
 
-TRACE_SHARE, QUICK_PIXELS, QUICK_SECONDS = 0.75, 131_072, 1.0
-"""Share of the time left that a trace may take before one of fewer pixels begins, and the pixels of the last,
-which is not given up, and the time that is left for it [s]."""
+TRACE_SHARE = 0.75
+"""Share of the time left that a trace may take before one of fewer pixels begins."""
+
+QUICK_PIXELS, QUICK_SECONDS = 131_072, 1.0
+"""Pixels of the coarsest trace, which always ends, and the time that is kept for it [s]."""
 
 DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
@@ -81,7 +84,7 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
 
 
 def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: Run) -> Traced:
-    """Trace an image; at a lower resolution where the run's time is too short, or it is stopped."""
+    """Trace an image, at a lower resolution if the run's time is too short or the run is stopped."""
     height, width = image.shape[:2]
 
     def traced(factor: int, check: Callable[[], None]) -> Traced:

@@ -113,9 +113,10 @@ class Layout:
     defaults: dict[str, Tensor]
     """Attributes by name, for those that come from no number."""
     gathers: tuple[Gather, ...]
-    """Of numbers: control points of outlines [shape units], shape (point, 2); the rows' colours, black for
-    gradients, (row, 3), and opacities, (row,); half widths, 0 for fills, (row,), unless no stroke has one
-    width."""
+    """Sums that are, in this order, control points of outlines [shape units], shape (point, 2); the rows'
+    colours, black for gradients, (row, 3), and opacities, (row,); and, if any stroke has a single width, half
+    widths, 0 for fills, (row,).
+    """
     areas: tuple[Area, ...]
     order: Tensor | None
     """Index of each of the scene's points among those of outlines and then of areas; None: the same order."""

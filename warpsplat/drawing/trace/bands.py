@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes
+from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes, unchecked
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.portable import filters
@@ -48,9 +48,7 @@ class _Piece:
         return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
 
 
-def split_uneven(
-    image: Floats, parts: Parts, noise: float, check: Callable[[], None] = lambda: None
-) -> Parts:
+def split_uneven(image: Floats, parts: Parts, noise: float, check: Callable[[], None] = unchecked) -> Parts:
     """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
 
     Args:

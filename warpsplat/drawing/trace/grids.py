@@ -177,3 +177,7 @@ def nearest_in(mask: Bools) -> Ints:
     source = np.zeros(int(labels.max()) + 1, np.int64)
     source[labels[mask]] = np.flatnonzero(mask)
     return np.asarray(source[labels])
+
+
+def unchecked() -> None:
+    """Do nothing: what long work calls now and then if nobody may stop it."""

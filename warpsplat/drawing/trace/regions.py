@@ -10,7 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.assign import fill_gaps, without_orphans, without_specks
 from warpsplat.drawing.trace.bands import split_uneven
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, unchecked
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
 from warpsplat.drawing.trace.palette import Coloring, paint_parts
 from warpsplat.drawing.trace.seeds import find_seeds, noise_of
@@ -45,7 +45,7 @@ class Regions:
     """Pixels along one of the image."""
 
 
-def find_regions(image: Floats, price: float = 1.0, check: Callable[[], None] = lambda: None) -> Regions:
+def find_regions(image: Floats, price: float = 1.0, check: Callable[[], None] = unchecked) -> Regions:
     """Cut an image up into regions.
 
     Args:

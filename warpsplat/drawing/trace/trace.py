@@ -13,7 +13,7 @@ from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, unchecked
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
@@ -50,10 +50,6 @@ class Traced:
 
 RUNS_TOGETHER = 2000
 """Parts of outlines to which curves are fitted from one check to the next."""
-
-
-def unchecked() -> None:
-    """Do nothing."""
 
 
 def trace(
