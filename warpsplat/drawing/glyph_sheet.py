@@ -90,13 +90,15 @@ class Sheet:
         glyphs = self.copies[copies]
         moved = drawn.points[ranges(drawn.starts[contours], counts)]
         moved = moved + np.repeat(self.places[copies] - self.corners[glyphs], counts, axis=0)
-        # What leaves the sheet, where nobody sees it, would be seen in the image.
-        low = np.repeat(self.places[copies] - GAP, counts, axis=0)
-        high = low + np.repeat(self.sizes[glyphs] + 2 * GAP, counts, axis=0)
+        # What leaves the sheet, where nobody sees it, would be seen in the image. Handles reach farther.
+        places, sizes = (
+            np.repeat(each, counts, axis=0) for each in (self.places[copies], self.sizes[glyphs])
+        )
+        beyond = np.where((np.arange(len(moved)) % 3 > 0)[:, None], sizes, GAP)
         return replace(
             drawn.take(np.array([0])),
             canvas=rest.canvas,
-            points=np.clip(moved, low, high).astype(np.float32),
+            points=np.clip(moved, places - beyond, places + sizes + beyond).astype(np.float32),
             starts=starts_of(counts),
             closed=drawn.closed[contours],
             first=np.array([0, counts.sum()], np.int32),
