@@ -70,7 +70,17 @@ def _packed(clusters: list[list[int]], nodes: IndexArray, most: int) -> list[lis
 
 def with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
     """Return ``scene`` with shapes split into ``parts``: lists of contours, by shape."""
-    split = scene.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
+    # One contour of each stands for all until the parts have their own.
+    one = np.searchsorted(scene.starts, scene.first[:-1])
+    counts = np.diff(scene.starts)[one]
+    bare = replace(
+        scene,
+        points=scene.points[ranges(scene.starts[one], counts)],
+        starts=starts_of(counts),
+        closed=scene.closed[one],
+        first=starts_of(counts),
+    )
+    split = bare.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
     order = [part for own in parts for part in own]
     contours = np.concatenate(order)
     counts = np.diff(scene.starts)[contours]
