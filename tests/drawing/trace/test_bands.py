@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.metrics import psnr
@@ -25,6 +26,22 @@ def test_a_soft_shadow_is_a_few_bands() -> None:
     scene = trace(image).scene
     assert 6 <= len(scene) <= 30
     assert psnr(255 * render(scene), 255 * image) > 36  # a single gradient reaches 28
+
+
+def test_cuts_that_gain_nothing_at_first_are_made() -> None:
+    """Both halves of a ring of shade are as far from a gradient as all of it."""
+    shade = np.zeros((96, 96), np.float32)
+    shade[28:76, 24:72] = 0.6
+    tone = (1 - cv2.GaussianBlur(shade, (0, 0), 6)[..., None]) * np.array([0.87, 0.92, 0.96], np.float32)
+    tone[24:72, 24:72] = 0.98
+    image = np.round(tone * 255).astype(np.float32) / 255
+    assert psnr(255 * render(trace(image).scene)[..., :3], 255 * image) > 36
+
+
+def test_shading_of_many_hues_is_not_cut_into_patches() -> None:
+    y, x = np.mgrid[:64, :64] / np.float32(64)
+    image = np.round(np.stack([1 - x / 2, 0.5 + y / 2, x / 3], axis=2) * 255).astype(np.float32) / 255
+    assert len(trace(image).scene) <= 2
 
 
 def test_a_shadow_that_fades_away_is_kept() -> None:
@@ -62,3 +79,10 @@ def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:
     assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white
     dirt = np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)
     assert noise_of(dirt) > 1
+
+
+def test_stops_of_a_gradient_are_pixels_apart() -> None:
+    tones = np.linspace(0, 120, 12)[:, None] + np.random.default_rng(0).integers(-3, 4, (12, 60))
+    ramp = fit_ramp(np.repeat(tones[..., None], 4, axis=2).astype(np.float32), np.ones((12, 60), bool), 0, 0)
+    assert ramp is not None
+    assert np.diff(ramp.offsets).min() * np.hypot(*ramp.frame[2:4]) >= 0.99

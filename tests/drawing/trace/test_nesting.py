@@ -45,3 +45,7 @@ def test_another_hue_that_nothing_painted_over_gives_lies_beside() -> None:
     regions = _rings(100, 120)
     regions.colorings[1] = Coloring(np.array([100.0, 0, 0, 100]), is_band=True)
     assert find_nesting(regions).depth.max() == 0
+
+
+def test_nothing_lies_on_a_band_that_is_too_faint_to_be_painted() -> None:
+    assert find_nesting(_rings(2, 20, 80)).parent.tolist() == [NO_REGION, NO_REGION, NO_REGION, 2]

@@ -193,3 +193,15 @@ def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them()
     image[10:40, 40:54, :3] = 0.1, 0.3, 0.9
     image[26:38, 26:44] = 0
     assert render(trace(image).scene)[28:36, 28:42, 3].max() < 0.01
+
+
+def test_what_lies_in_a_bay_of_a_higher_line_is_seen() -> None:
+    """Three lines go round a square, the innermost below the others: the shortest way under the square from
+    one end of the outer line to the other would cover it."""
+    image = np.ones((96, 96, 3), np.float32)
+    image[18:84, 12:84] = (0.2, 0.5, 0.8)
+    image[24:81, 15:81] = (0.5, 0.7, 0.3)
+    image[30:79, 17:79] = (0.9, 0.6, 0.1)
+    image[10:73, 23:73] = 0.3
+    traced = trace(image)
+    assert psnr(255 * render(traced.scene)[..., :3], 255 * image) > 40

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from warpsplat.portable.linear import product
 LEAST_BAND = 30  # [px] of a band; smaller pieces stay with what surrounds them
 MOST_BANDS = 256  # of an image
 SOFT = 1.5  # [px] standard deviation of the blur before a part is cut, so that noise does not fray the bands
+ONE_TONE = 1.0  # [levels] root mean square by which colours of one tone are off a line, besides noise
 POWERS = 8  # steps of the power iteration
 TONES = 64  # levels of tone among which a part is cut in two
 FLAT_BYTES, RAMP_BYTES = 100.0, 250.0  # of a band in a file, about, with a flat colour or a gradient
@@ -37,6 +38,8 @@ class _Piece:
     coloring: Coloring
     error: float
     """Sum of the squared errors over all pixels and channels [levels squared]."""
+    halves: list[_Piece] = field(default_factory=list)
+    """What it may be cut into."""
 
     def box(self) -> tuple[slice, slice]:
         """Return the rows and columns of the bounding box."""
@@ -57,29 +60,50 @@ def split_uneven(image: Floats, parts: Parts, noise: float, check: Callable[[], 
         noise: of flat regions [levels].
         check: as for ``trace``.
     """
-    waiting = _uneven(image, parts, UNEVEN + noise)
-    if not waiting:
+    roots = _uneven(image, parts, UNEVEN + noise)
+    if not roots:
         return parts
-    error = sum(piece.error for piece in waiting) + image.size * (FLOOR + noise) ** 2
-    size = FLAT_BYTES * len(parts.paint)
-    queue = [(-piece.error, number, piece) for number, piece in enumerate(waiting)]
-    heapq.heapify(queue)
-    done: list[_Piece] = []
-    made = len(queue)
-    while queue and made < MOST_BANDS:
+    rest = image.size * (FLOOR + noise) ** 2
+    others = FLAT_BYTES * len(parts.paint) - sum(piece.bytes() for piece in roots)
+    leaves = [(-piece.error, number, piece) for number, piece in enumerate(roots)]
+    heapq.heapify(leaves)
+    made = len(leaves)
+    error, size = rest + sum(piece.error for piece in roots), FLAT_BYTES * len(parts.paint)
+    while leaves and made < MOST_BANDS and -leaves[0][0] > FLAT_BYTES * DOUBLING * error / size:
         check()
-        _, _, piece = heapq.heappop(queue)
+        piece = heapq.heappop(leaves)[2]
         halves = _halves(image, piece)
         gain = piece.error - sum(half.error for half in halves)
         growth = sum(half.bytes() for half in halves) - piece.bytes()
-        if len(halves) < 2 or gain / error <= DOUBLING * growth / size:
-            done.append(piece)
+        is_gain = gain / error > DOUBLING * growth / size
+        if len(halves) < 2 or not (is_gain or _is_one_tone(image[piece.box()][piece.mask], noise)):
             continue
+        piece.halves.extend(halves)
         error, size = error - gain, size + growth
         for half in halves:
             made += 1
-            heapq.heappush(queue, (-half.error, made, half))
-    return _with_bands(image, parts, done + [piece for *_, piece in sorted(queue)])
+            heapq.heappush(leaves, (-half.error, made, half))
+    # The first cuts of a shadow gain little without those that follow: only now those not worth it go.
+    bands, fewer = list[_Piece](), roots
+    while len(bands) != len(fewer):
+        bands = fewer
+        fewer = [band for piece in roots for band in _worthwhile(piece, DOUBLING * error / size)]
+        error, size = rest + sum(band.error for band in fewer), others + sum(band.bytes() for band in fewer)
+    return _with_bands(image, parts, bands)
+
+
+def _is_one_tone(pixels: Floats, noise: float) -> bool:
+    """Return whether colours, shape (pixel, channel), lie on a line, so that bands of one tone show them."""
+    off = pixels.astype(np.float64) - pixels.mean(axis=0, dtype=np.float64)
+    along = (off * _direction(off)).sum(axis=1)
+    return float((off**2).sum() - (along**2).sum()) <= off.size * (ONE_TONE + noise) ** 2
+
+
+def _worthwhile(piece: _Piece, worth: float) -> list[_Piece]:
+    """Return the bands that a piece is cut into if a byte is worth so much error [levels squared]."""
+    bands = [band for half in piece.halves for band in _worthwhile(half, worth)]
+    costs = [sum(one.error + worth * one.bytes() for one in made) for made in ([piece], bands)]
+    return bands if bands and costs[1] < costs[0] else [piece]
 
 
 def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:

@@ -66,7 +66,7 @@ class Cover:
         return hidden
 
     def hides_polygon(self, rank: int, polygon: Floats) -> bool:
-        """Return whether all of a polygon is hidden, pixels on its edge aside."""
+        """Return whether no region up to a rank is seen in a polygon, pixels on its edge aside."""
         low = np.floor(polygon.min(axis=0)).astype(np.intp)
         width, height = np.ceil(polygon.max(axis=0)).astype(np.intp) - low + 1
         mask = np.zeros((height, width), np.uint8)
@@ -161,8 +161,10 @@ class HiddenPaths:
         free = beside <= 2 * CUT_OFF
         kept = np.flatnonzero(free)
         free[kept] = self.cover.hides_lines(self.rank[path[kept]], self.goals[i[kept]], self.goals[j[kept]])
-        for number in np.flatnonzero(free & self.has_holes).tolist():
+        # Nothing lower may be covered; and nothing of the region itself be missing beside a hole.
+        below = self.rank[path] - (0 if self.has_holes else 1)
+        for number in np.flatnonzero(free).tolist():
             low, high = int(i[number]), int(j[number])
             polygon = np.concatenate([self.vertices[low : high + 1], self.goals[[high, low]]])
-            free[number] = self.cover.hides_polygon(int(self.rank[path[number]]), polygon)
+            free[number] = self.cover.hides_polygon(int(below[number]), polygon)
         return free

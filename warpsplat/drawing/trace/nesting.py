@@ -51,7 +51,7 @@ def find_nesting(regions: Regions) -> Nesting:
     count = len(regions.paint)
     own = [regions.colorings[paint] for paint in regions.paint.tolist()]
     parent, depth = np.full(count, NO_REGION, np.int64), np.zeros(count, np.int64)
-    bands = [i for i, each in enumerate(own) if each.is_band and each.color[3] < OPAQUE]
+    bands = [i for i, each in enumerate(own) if each.is_band and not each.is_clear and each.color[3] < OPAQUE]
     colorings = list(own)
     if not bands:
         return Nesting(parent, depth, colorings)

@@ -19,7 +19,10 @@ LEAST_SLOPES = 8  # pixels where the slope is known, at the least
 RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
 SPAN = 3  # [px] over which the slope is taken, to each side
 BLUR = 1.5  # [px] standard deviation of the filter before that
-BINS = 48  # places along a ramp where its colour is measured
+BINS, BIN = (
+    48,
+    1.0,
+)  # places along a ramp where its colour is measured, and how far apart they are at least [px]
 STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 OFF = 1.0  # [levels] of the colours between two stops from a straight line, at the most
 MOST_STOPS = 8
@@ -96,7 +99,7 @@ def _linear(points: Floats, colors: Floats, slopes: Floats) -> Ramp:
     origin = middle + (low - float((middle * direction).sum())) * direction
     axis = direction * length
     frame = np.concatenate([origin, axis, [-axis[1], axis[0]]])
-    return Ramp(Paint.LINEAR, frame, *_profile((along - low) / length, colors))
+    return Ramp(Paint.LINEAR, frame, *_profile((along - low) / length, length, colors))
 
 
 def _center(places: Floats, slopes: Floats) -> Floats | None:
@@ -116,12 +119,15 @@ def _radial(points: Floats, colors: Floats, center: Floats) -> Ramp:
     distance = hypot(*(points - center).T)
     reach = max(float(distance.max()), 1e-3)
     frame = np.array([*center, reach, 0.0, 0.0, reach], np.float64)
-    return Ramp(Paint.RADIAL, frame, *_profile(distance / reach, colors))
+    return Ramp(Paint.RADIAL, frame, *_profile(distance / reach, reach, colors))
 
 
-def _profile(t: Floats, colors: Floats) -> tuple[Floats, Floats, float]:
-    """Fit stops to the colours along ``t`` in 0..1: their offsets, their colours, and the residual."""
-    knots = np.linspace(0, 1, BINS + 1)
+def _profile(t: Floats, length: float, colors: Floats) -> tuple[Floats, Floats, float]:
+    """Fit stops to the colours along ``t`` in 0..1: their offsets, their colours, and the residual.
+
+    ``length``: of the ramp [px].
+    """
+    knots = np.linspace(0, 1, 1 + min(max(int(length / BIN), 1), BINS))
     fine = _least_squares(t, colors, knots)
     seen = np.histogram(t, knots)[0]
     known = np.concatenate([[True], (seen[1:] + seen[:-1]) > 0, [True]])
