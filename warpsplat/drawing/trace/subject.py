@@ -187,9 +187,10 @@ def _cells(image: FloatArray, counts: Ints) -> str | None:
 
 def _is_sprite(levels: Ints) -> bool:
     """Return whether a small image is drawn pixel by pixel: in recurring colours, without soft edges."""
+    if not CELLS[0] <= min(levels.shape[:2]) <= max(levels.shape[:2]) <= SPRITE:
+        return False
     counts = _colors(levels)[1]
-    is_small = CELLS[0] <= min(levels.shape[:2]) and max(levels.shape[:2]) <= SPRITE
-    if not is_small or len(counts) < 2:
+    if len(counts) < 2:
         return False
     frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
     if frequent < MOSTLY_FREQUENT * counts.sum() or len(counts) > MOST_COLORS:
