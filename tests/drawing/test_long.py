@@ -28,7 +28,7 @@ def test_it_says_how_many_nodes_take_how_long(
 ) -> None:
     made = drawing(Canvas(64, 64, WHITE), (RED, [disc(32, 32, 9)] * discs))
     with caplog.at_level(logging.WARNING):
-        announce_fit(made, Problem(np.ones((64, 64, 3), np.float32), Settings()))
+        announce_fit(len(made.joints) // 3, Problem(np.ones((64, 64, 3), np.float32), Settings()))
     assert ["12,000 nodes takes about 7 s" in message for message in caplog.messages] == [True] * is_long
 
 

@@ -12,9 +12,11 @@ from tests.scenes import random_scene
 from warpsplat.scene import Kind
 from warpsplat.svg.commands import (
     Pair,
+    Rings,
     Segment,
     choices,
     minus,
+    plus,
     row,
     segments_of,
     shortest,
@@ -83,6 +85,30 @@ def test_a_ring_is_the_shortest_of_its_starts() -> None:
     assert tuple(drawn.points[-1]) == end
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_copies_of_a_ring_are_drawn_in_their_places(seed: int) -> None:
+    chain = segments(seed, 9)
+    chain.append(Segment(chain[-1].end, None, chain[0].start))
+    rings = Rings()
+    pen: Pair | None = None
+    steps = [(0, 0), (900, -40), (1800, 7), (-2000, 300)]
+    texts = []
+    for step in steps:
+        moved = [
+            Segment(
+                plus(a, step), handles and (plus(handles[0], step), plus(handles[1], step)), plus(b, step)
+            )
+            for a, handles, b in chain
+        ]
+        texts.append(rings.data(pen, moved)[0])
+        best, _ = shortest_ring(pen, moved)
+        assert len(texts[-1]) <= len(best) + 2
+        pen = rings.data(pen, moved)[1]
+    first, *others = cubics("".join(texts), keep_dots=True)
+    for step, other in zip(steps[1:], others, strict=True):
+        assert np.allclose(other.points - step, first.points)
+
+
 def test_a_line_that_closes_is_left_out() -> None:
     """A fill leaves it out, wherever it starts; a stroke has the command that closes it."""
     square = [(0, 0), (100, 0), (103, 50), (0, 50)]
@@ -93,7 +119,7 @@ def test_a_line_that_closes_is_left_out() -> None:
     assert len(drawn.points) == 10
     assert tuple(drawn.points[-1]) == end
     grid = [(int(x), int(y)) for x, y in np.repeat(square, 3, axis=0)]
-    stroked, pen = cubic_data(segments_of(grid, [True] * 4, True), grid[0], True, True, None)
+    stroked, pen = cubic_data(segments_of(grid, [True] * 4, True), grid[0], True, None, None)
     assert stroked.endswith("z")
     assert pen == (0, 0)
     (drawn,) = cubics(stroked, keep_dots=True)

@@ -10,6 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
+from warpsplat.drawing.glyph_sheet import Sheet
+from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.trace.grids import unchecked
 from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
@@ -42,6 +44,10 @@ DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
 
 
+USUAL_DETAIL = 0.5
+"""``detail`` from which on letters are not given up."""
+
+
 def draft_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions."""
     settings = problem.settings
@@ -67,7 +73,9 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
     size, settings = enlargement(problem.target), problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        scene = trace_in_time(continued(original(problem.target), across, down), most, settings, run).scene
+        sheet, image = glyphs_of(problem)
+        scene = trace_in_time(continued(image, across, down), most, settings, run).scene
+        scene = sheet.placed(sheet.trace().scene, scene) if sheet else scene
         if settings.is_limited:
             scene = limited(scene.take(solid_shapes(scene)), settings)
         scene = enlarged(cut(scene, across, down), size, *problem.size)
@@ -81,6 +89,15 @@ def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
         return traced()
     others = [lambda: traced(*margin), lambda: draw_pixels(problem, run)]
     return best_of_thin(traced(), others[: 1 if most is not None else 2])
+
+
+def glyphs_of(problem: Problem) -> tuple[Sheet | None, FloatArray]:
+    """Return the sheet of an image's glyphs, and the image without them; None where something is limited."""
+    image, settings = original(problem.target), problem.settings
+    limits = settings.curves and not settings.simplify, settings.max_bytes, settings.is_limited
+    if any(limits) or settings.detail < USUAL_DETAIL or any(margins(problem.target, THIN_SIDE)):
+        return None, image
+    return find_glyphs(image)
 
 
 def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: Run) -> Traced:

@@ -15,17 +15,20 @@ from warpsplat.drawing.draft import (
     byte_price,
     draw_pixels,
     enlargement,
+    glyphs_of,
     limited,
     original,
     trace_in_time,
 )
+from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
-from warpsplat.drawing.tidy import Finished
+from warpsplat.drawing.tidy import LEAST_ERROR, Finished
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
 SECONDS_PER_TRACED = 4e-6
@@ -48,9 +51,12 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
     announce_trace(problem)
+    sheet, rest = glyphs_of(problem)
+    if sheet:
+        return _drawn_with_sheet(problem, run, sheet, rest)
     traced = trace_regions(problem, run, most)
     if not run.over():
-        announce_fit(traced, problem)
+        announce_fit(len(traced.joints) // 3, problem)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
     finish = partial(
@@ -78,15 +84,50 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
 
 
+def _drawn_with_sheet(problem: Problem, run: Run, sheet: Sheet, rest: FloatArray) -> Fit:
+    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes."""
+    settings, found = problem.settings, sheet.trace()
+    copies = len(sheet.copies) / len(sheet.corners)
+    parts = [
+        (Drawing(found.scene, found.joints), sheet.image, copies),
+        (trace_regions(replace(problem, target=rest), run, None), rest, 1.0),
+    ]
+    nodes = [len(drawing.joints) / 3 * times for drawing, _, times in parts]
+    if not run.over():
+        announce_fit(sum(len(drawing.joints) for drawing, *_ in parts) // 3, problem)
+    run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * sum(nodes))
+    scenes: list[Scene] = []
+    grid, runs = None, run.open_parts()
+    glyphs_first = nodes[0] >= nodes[1]
+    for drawing, image, times in parts if glyphs_first else parts[::-1]:
+        done = finish_by_lightness(
+            image,
+            drawing,
+            next(runs),
+            finest=finest(settings),
+            tidy=settings.tidy,
+            price=byte_price(settings),
+            symbols=settings.symbols,
+            grid=grid,
+            # What does not count in all of the image, in pixels of this part.
+            negligible=LEAST_ERROR * max(rest[..., 0].size / (times * image[..., 0].size), 1.0),
+        )
+        grid = done.per_pixel
+        scenes.append(done.drawing.scene)
+    glyphs, others = scenes if glyphs_first else scenes[::-1]
+    scene, per_pixel = _whole(sheet.placed(glyphs, others), done.per_pixel, problem, run)
+    return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
+
+
 def announce_trace(problem: Problem) -> None:
     """Say so if the trace of an image will take long."""
     pixels = original(problem.target)[..., 0].size
     _announce(problem, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_TRACED * pixels)
 
 
-def announce_fit(traced: Drawing, problem: Problem) -> None:
-    """Say so if the fit of a traced drawing will take long."""
-    nodes, (width, height) = len(traced.joints) // 3, problem.size
+def announce_fit(nodes: int, problem: Problem) -> None:
+    """Say so if the fit of a drawing with so many traced nodes will take long."""
+    width, height = problem.size
     seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
     _announce(problem, f"fitting its {nodes:,} nodes", seconds)
 
@@ -137,18 +178,23 @@ def trace_regions(problem: Problem, run: Run, most: int | None) -> Drawing:
 
 def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
-    size = enlargement(problem.target)
-    scene = enlarged(done.drawing.scene, size, *problem.size)
-    if problem.settings.strokes and not run.over():
-        from warpsplat.drawing.pen import with_strokes
-
-        scene = with_strokes(scene, problem.settings, run)
-    per_pixel = done.per_pixel / size
+    scene, per_pixel = _whole(done.drawing.scene, done.per_pixel, problem, run)
     if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)) or math.isnan(done.psnr):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
         made = Fit(scene, per_pixel, done.psnr, done.psnr, 0, run.stopped())
     return Sketch(made, _size(made, problem.settings), done.drawing)
+
+
+def _whole(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> tuple[Scene, float]:
+    """Return a scene of the image before it was enlarged, and its grid, at the size of the image."""
+    size = enlargement(problem.target)
+    scene = enlarged(scene, size, *problem.size)
+    if problem.settings.strokes and not run.over():
+        from warpsplat.drawing.pen import with_strokes
+
+        scene = with_strokes(scene, problem.settings, run)
+    return scene, per_pixel / size
 
 
 def _size(made: Fit, settings: Settings) -> int:

@@ -84,6 +84,8 @@ def finish_drawing(
     tidy: bool = True,
     price: float = 1.0,
     symbols: bool = False,
+    grid: float | None = None,
+    negligible: float = LEAST_ERROR,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -96,26 +98,28 @@ def finish_drawing(
         tidy: whether nodes are removed.
         price: of a byte, over its usual one: the higher, the fewer nodes are left.
         symbols: whether nearly equal outlines become equal.
+        grid: view box units per pixel; None: those that cost least.
+        negligible: mean squared error below which differences do not count.
     """
     target = matching(target, drawing.scene.canvas)
     if run.over() or not len(drawing.scene):
-        return Finished(drawing, min(DRAFT_GRID, finest))
+        return Finished(drawing, grid or min(DRAFT_GRID, finest))
     fit = OutlineFit(target, drawing, run)
     fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
-    _roam(fit, target, run, FIRST_ROAM)
+    _roam(fit, target, run, FIRST_ROAM, negligible)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, price, run.over), run, fit.capacity)
+        fit = OutlineFit(target, tidied(fit, price, negligible, run.over), run, fit.capacity)
         fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
-        _roam(fit, target, run, SECOND_ROAM)
+        _roam(fit, target, run, SECOND_ROAM, negligible)
     equal: list[Equal] = []
     if tidy and not run.over():
         fitted = fit.drawing
-        exact, equal = with_exact_shapes(target, fitted, run, price, symbols=symbols)
+        exact, equal = with_exact_shapes(target, fitted, run, price, negligible, symbols=symbols)
         if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
     if run.over():
-        return Finished(fit.drawing, min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
-    grid = drawing_grid(fit, finest, price)
+        return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
+    grid = grid or drawing_grid(fit, finest, price, negligible)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
     held[::3] = True
@@ -126,16 +130,16 @@ def finish_drawing(
     return Finished(replace(drawing, scene=low), grid, decibels(fit.error * 255**2))
 
 
-def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int) -> None:
+def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int, negligible: float) -> None:
     """Let outlines leave poor minima if the drawing is not yet near the image."""
-    if fit.error > LEAST_ERROR and not run.over():
+    if fit.error > negligible and not run.over():
         quiet = replace(run, on_progress=None)
         fit.roam(quiet, min(steps, ROAM_PIXELS // target[..., 0].size))
         fit.advance(quiet, THIRD_STEPS)
 
 
 def with_exact_shapes(
-    target: FloatArray, drawing: Drawing, run: Run, price: float, *, symbols: bool
+    target: FloatArray, drawing: Drawing, run: Run, price: float, negligible: float, *, symbols: bool
 ) -> tuple[Drawing, list[Equal]]:
     """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
 
@@ -153,19 +157,24 @@ def with_exact_shapes(
 
     errors = errors_of(drawing)
     size = estimated_size(drawing.scene, DRAFT_GRID)
-    worth = price * byte_worth(max(float(errors.sum()), LEAST_ERROR), size)
+    worth = price * byte_worth(max(float(errors.sum()), negligible), size)
     exact = with_shapes(target, drawing, errors_of, errors, worth, run.over)
     if not symbols:
         return exact, []
     return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
 
 
-def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool) -> Drawing:
+def tidied(
+    fit: OutlineFit,
+    price: float = 1.0,
+    negligible: float = LEAST_ERROR,
+    over: Callable[[], bool] = bool,
+) -> Drawing:
     """Return a drawing without the nodes, curves and slants that are worth less than their bytes.
 
     In each round edits that do not overlap are made together and the outlines fitted to where the image says
     that they are; each edit is judged by what is left around it, and if some cost too much, the others are
-    made without them. ``price``: see ``finish_drawing``.
+    made without them. ``price`` and ``negligible``: see ``finish_drawing``.
     """
     drawing, least = fit.drawing, fit.least
     samples = fit.places()
@@ -175,7 +184,7 @@ def tidied(fit: OutlineFit, price: float = 1.0, over: Callable[[], bool] = bool)
     refused = np.zeros((len(errors), 4), np.bool_)
     for _ in range(ROUNDS):
         edits = Outlines(drawing).edits(refused)
-        worth = price * byte_worth(max(rest + float(errors.sum()), LEAST_ERROR), size)
+        worth = price * byte_worth(max(rest + float(errors.sum()), negligible), size)
         growth = model.before_fit(samples, drawing, edits)
         cheap = growth <= RECOVERED * edits.saved * worth
         edits, growth = edits.take(cheap), growth[cheap]
@@ -215,13 +224,15 @@ def touched(contours: Links, count: int) -> Flags:
     return np.bincount(contours, minlength=count) > 0
 
 
-def drawing_grid(fit: OutlineFit, finest: float, price: float = 1.0) -> float:
+def drawing_grid(
+    fit: OutlineFit, finest: float, price: float = 1.0, negligible: float = LEAST_ERROR
+) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
     sizes = [estimated_size(scene, grid) for grid in MEASURED_GRIDS]
     digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
-    worth = price * byte_worth(max(fit.error, LEAST_ERROR), sizes[1])
+    worth = price * byte_worth(max(fit.error, negligible), sizes[1])
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))

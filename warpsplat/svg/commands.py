@@ -8,6 +8,7 @@ The shortest text is found by dynamic programming over the last letter.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -45,6 +46,11 @@ def _text(written: _Written | None) -> str:
         _, added, written = written
         parts.append(added)
     return "".join(reversed(parts))
+
+
+def plus(a: Pair, b: Pair) -> Pair:
+    """Return the sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1]
 
 
 def minus(a: Pair, b: Pair) -> Pair:
@@ -152,6 +158,45 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
             last -= 1
         found.append((_shortest(pen, start, rotated), segments[last].end))
     return min(found, key=lambda one: len(one[0]))
+
+
+MOVE = re.compile(r"([Mm])(-?\d+) ?(-?\d+)")
+
+
+class Rings:
+    """Path data of rings of fills; of those that differ by their place only, it is looked for once."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self._known: dict[tuple[Segment, ...], tuple[Pair, str, Pair]] = {}
+        """Where the text of a ring begins, from the first segment; it without the move; where it ends."""
+
+    def data(self, pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]:
+        """Return path data of a ring, and where its last command ends, as ``shortest_ring``."""
+        origin = segments[0].start
+        key = tuple(_moved(segment, origin) for segment in segments)
+        if key in self._known:
+            first, drawn, last = self._known[key]
+            start = plus(first, origin)
+            moves = [f"m{row(minus(start, pen or (0, 0)), False)}", f"M{row(start, False)}"]
+            # Behind a relative move, lines need no letter.
+            move = min(moves, key=len) if drawn[:1].isalpha() else moves[0]
+            return move + drawn, plus(last, origin)
+        text, end = shortest_ring(pen, segments)
+        if move_found := MOVE.match(text):
+            letter, x, y = move_found.groups()
+            drawn = text[move_found.end() :]
+            if drawn.islower() and (letter == "m" or drawn[0].isalpha()):
+                start = plus((int(x), int(y)), (pen or (0, 0)) if letter == "m" else (0, 0))
+                self._known[key] = minus(start, origin), drawn, minus(end, origin)
+        return text, end
+
+
+def _moved(segment: Segment, origin: Pair) -> Segment:
+    """Return a segment with ``origin`` at 0."""
+    start, handles, end = segment
+    inner = None if handles is None else (minus(handles[0], origin), minus(handles[1], origin))
+    return Segment(minus(start, origin), inner, minus(end, origin))
 
 
 def segments_of(grid: Sequence[Pair], straight: Sequence[bool], closed: bool) -> list[Segment]:

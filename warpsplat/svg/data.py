@@ -15,11 +15,11 @@ from warpsplat.scene import Basis, IndexArray, Kind, Scene
 from warpsplat.svg.commands import (
     SMALL,
     Pair,
+    Rings,
     Segment,
     minus,
     segments_of,
     shortest,
-    shortest_ring,
     shortest_smooth,
 )
 from warpsplat.svg.forms import held_values
@@ -104,6 +104,7 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
     strokes = scene.kind == Kind.STROKE
     # A fill closes its contours, a stroke does not, and its dashes depend on the start.
     arcs = {i: made.rounded() for i, made in primitives(scene, exact) if made.radii[0] > 0}
+    rings = Rings()
     stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
     for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):
         texts = []
@@ -124,22 +125,29 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
             )
             if not strokes[shape]:  # only in a stroke does a dot show
                 segments = [segment for segment in segments if segment.has_extent()]
-            text, pen = cubic_data(segments, grid[rows.start], closed[contour], stroked[shape], pen)
+            text, pen = cubic_data(
+                segments, grid[rows.start], closed[contour], None if stroked[shape] else rings, pen
+            )
             texts.append(text)
         yield "".join(texts)
 
 
 def cubic_data(
-    segments: list[Segment], start: Pair, closed: bool, is_stroked: bool, pen: Pair | None
+    segments: list[Segment], start: Pair, closed: bool, rings: Rings | None, pen: Pair | None
 ) -> tuple[str, Pair]:
     """Return the path data of a contour of lines and cubics, and where the pen is then.
 
-    In a stroke, a ring's joint is visible, and its start matters. ``pen``: where the pen is before, if any.
+    Args:
+        segments: Of the contour.
+        start: Its first point.
+        closed: Whether it is a ring.
+        rings: Of the fill; None for a stroke, where a ring's joint is visible, and its start matters.
+        pen: Where the pen is before, if any.
     """
     if not segments:
         return f"M{integers([start])}z", start
-    if closed and not is_stroked:
-        return shortest_ring(pen, segments)
+    if closed and rings:
+        return rings.data(pen, segments)
     if not closed:
         return shortest(pen, segments), segments[-1].end
     if segments[-1].handles is None and len(segments) > 1:

@@ -24,6 +24,7 @@ MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
 FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colours
 MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
+LEAST_MIXED = 0.2  # pixels for each pair of neighbours of different colours, where there is antialiasing
 SMALL = 64 * 64  # [px] of an image without gradients that is drawn by sub-pixels if any is thin
 FOREIGN_IN_SMALL = 0.3  # the largest foreign share there
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
@@ -53,13 +54,12 @@ class _Mixed:
 def with_sub_pixels(regions: Regions) -> Regions:
     """Return the regions at several times the resolution if many of them are thin."""
     height, width = regions.labels.shape
-    scale = next((s for s in SCALES if s * s * height * width <= MOST_SUB_PIXELS), 1)
+    scale = _largest_scale(regions)
     used = numbers_in(regions.paint).tolist()
     has_bands = any(regions.colorings[k].is_band for k in used)
     if scale == 1 or regions.noise or has_bands or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
-    colors = np.stack([coloring.color for coloring in inked.colorings]).astype(np.float32)
     shown = _shown(inked)
     painted, mixed = _unmixed(inked, shown)
     is_small = height * width <= SMALL and all(regions.colorings[k].ramp is None for k in used)
@@ -71,6 +71,30 @@ def with_sub_pixels(regions: Regions) -> Regions:
     small = _mapped(painted, mixed, scale)
     if _border(small) > MOST_FRAYED * scale * _border(regions.labels):
         return regions
+    return _refined(inked, small, mixed, shown, scale)
+
+
+def by_sub_pixels(regions: Regions) -> Regions:
+    """Return regions of flat colours, whose pixels are all mixtures, at several times the resolution.
+
+    Without antialiasing they stay as they are.
+    """
+    scale = _largest_scale(regions)
+    shown = _shown(regions)
+    painted, mixed = _unmixed(regions, shown)
+    if len(mixed.rows) < LEAST_MIXED * _border(painted):
+        return regions
+    return _refined(regions, _mapped(painted, mixed, scale), mixed, shown, scale)
+
+
+def _largest_scale(regions: Regions) -> int:
+    """Return how fine sub-pixels of an image may be; 1 if it is too large for them."""
+    return next((s for s in SCALES if s * s * regions.labels.size <= MOST_SUB_PIXELS), 1)
+
+
+def _refined(regions: Regions, small: Ints, mixed: _Mixed, shown: dict[int, Floats], scale: int) -> Regions:
+    """Return regions at several times the resolution; ``small``: the colouring of each sub-pixel."""
+    colors = np.stack([coloring.color for coloring in regions.colorings]).astype(np.float32)
     _remove_specks(small, mixed, colors, scale)
     places = np.indices(small.shape) // scale
     fills = _colors_at(shown, small, places[0], places[1])
@@ -78,7 +102,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     labels = components(small, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = small
-    return replace(inked, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
+    return replace(regions, image=image, labels=labels, fills=fills, paint=paint, scale=scale)
 
 
 def _remove_specks(small: Ints, mixed: _Mixed, colors: Floats, scale: int) -> None:

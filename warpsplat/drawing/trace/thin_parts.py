@@ -20,6 +20,7 @@ from warpsplat.scene.scene import numbers_in
 ROUNDS = 4  # colours in one thin part, at the most
 MOST_PARTS = 4000  # in a round; an image with more is no drawing
 SMALL = 8  # [px] of a part that may lie where several regions meet
+LARGE = 100  # [px] of a part among whose pixels there may be one more new colour
 FAINT = 24.0  # [levels] a small part whose largest residual is less is no part
 COVERED = 0.35  # least share of the part's colour in a pixel that belongs to it
 COVERED_OF_MOST = 0.8  # or this share of the largest one, if that is less
@@ -126,7 +127,7 @@ def _round(
         ):
             continue
         chosen = _matching_color(thin, flat, near, limit)
-        if chosen is None or (chosen == len(colorings) and not new_colors):
+        if chosen is None or (chosen == len(colorings) and not new_colors and len(y) < LARGE):
             continue
         if chosen == len(colorings):
             colorings.append(Coloring(thin.typical_color()))

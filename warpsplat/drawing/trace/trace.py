@@ -71,13 +71,13 @@ def trace(
     regions = find_regions(levels, price, check)
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
     regions = worthwhile_regions(regions, price)
-    traced = trace_regions(regions, may_have_ground=is_opaque, check=check)
+    traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
         # Regions of one colour may be one path, so that there may be more of them than paths.
         target = max(2, min(target - 1, int(target * most / len(traced.scene))))
         regions = fewer_regions(regions, target)
-        traced = trace_regions(regions, may_have_ground=is_opaque, check=check)
+        traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)
     return traced
 
 
@@ -91,8 +91,6 @@ def trace_regions(
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
         check: As for ``trace``.
     """
-    check()
-    regions = with_sub_pixels(regions)
     check()
     nesting, count = find_nesting(regions), len(regions.paint)
     flat = replace(regions, labels=nesting.shown(0)[regions.labels])
