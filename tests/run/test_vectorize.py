@@ -16,8 +16,9 @@ from warpsplat.extensions import renderer_names
 from warpsplat.files.sources import image_of
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, make_settings
+from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_ssimulacra2
+from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
 from warpsplat.scene import Kind
 from warpsplat.svg.write import read_metadata
 
@@ -188,3 +189,9 @@ def test_work_grows_to_one(device: str, strategy: str) -> None:
     assert work == sorted(work) and len(work) > 1
     assert 0 <= work[0] < 0.9 and work[-1] == 1
     assert all(progress.snapshot for progress in seen)
+
+
+def test_a_time_budget_is_not_missed_by_hundredths_of_a_second() -> None:
+    score = score_svg('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 8"/>', picture(8, 8))
+    settings = make_settings(time_budget=2.0)
+    assert [len(missed_goals(settings, score, seconds)) for seconds in (1.9, 2.1, 2.3)] == [0, 0, 1]

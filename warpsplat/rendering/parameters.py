@@ -26,7 +26,7 @@ from warpsplat.scene import (
     Scene,
 )
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.scene.scene import level_ends, starts_of
+from warpsplat.scene.scene import level_ends, numbers_in, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """Type as which kernels read a row of so many numbers."""
@@ -108,7 +108,7 @@ class Parameters:
         if self.has_twins:
             self.arrays["point_twin"] = self._ints(_twins(values))
         self.tie_circles(_circular(scene))
-        self.parts = tuple(np.unique(parts).tolist())
+        self.parts = tuple(numbers_in(parts).tolist())
         """Parts of exact coverage that have shapes."""
         if constants.STYLED in self.parts:
             self._upload_styles(scene)
@@ -117,7 +117,7 @@ class Parameters:
         self.forms: tuple[Basis, ...] = ()
         """The bases of the shapes if some are forms, of which ``rendering.forms`` computes control points."""
         if values.forms():
-            self.forms = tuple(map(Basis, np.unique(values.basis).tolist()))
+            self.forms = tuple(map(Basis, numbers_in(values.basis).tolist()))
 
     def _upload_values(self, scene: Scene, moments: Moments) -> None:
         shapes = np.arange(len(scene))
@@ -190,7 +190,7 @@ class Parameters:
     @property
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes in the scene."""
-        return frozenset(Kind(k) for k in np.unique(self._scene.kind))
+        return frozenset(Kind(k) for k in numbers_in(self._scene.kind))
 
     @property
     def curves(self) -> bool:
@@ -200,7 +200,7 @@ class Parameters:
     @property
     def paints(self) -> frozenset[Paint]:
         """Paints of shapes in the scene."""
-        return frozenset(Paint(k) for k in np.unique(self._scene.paint))
+        return frozenset(Paint(k) for k in numbers_in(self._scene.paint))
 
     @property
     def pictures(self) -> tuple[Picture, ...]:

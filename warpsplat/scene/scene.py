@@ -273,7 +273,7 @@ class Scene:
 
     def forms(self) -> tuple[Basis, ...]:
         """Return the forms that some shapes have."""
-        return tuple(Basis(basis) for basis in np.unique(self.basis).tolist() if Basis(basis).is_form)
+        return tuple(Basis(basis) for basis in numbers_in(self.basis).tolist() if Basis(basis).is_form)
 
     def drawn(self) -> Scene:
         """Return the scene with the shapes of forms as cubics; itself if there are none."""
@@ -406,6 +406,11 @@ def ranges(low: npt.NDArray[np.integer], counts: npt.NDArray[np.integer]) -> Ind
     counts = counts.astype(np.intp)
     ends = np.cumsum(counts)
     return np.repeat(low - (ends - counts), counts) + np.arange(counts.sum())
+
+
+def numbers_in(values: npt.NDArray[np.integer]) -> IndexArray:
+    """Return the different ones among numbers of at least 0, ascending: faster than by ``np.unique``."""
+    return np.flatnonzero(np.bincount(values.reshape(-1)))
 
 
 def starts_of(counts: npt.NDArray[np.integer]) -> IntArray:

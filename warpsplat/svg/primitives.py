@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from warpsplat.scene import Basis, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import ARC_HANDLE
+from warpsplat.scene.scene import numbers_in
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
 
@@ -130,7 +131,7 @@ def _cubics(boxes: Floats, clockwise: npt.NDArray[np.bool_]) -> Iterator[tuple[I
     """
     kinds = np.concatenate([_are_round(boxes), boxes[:, 4:5] > 0, clockwise[:, None]], axis=1)
     kind_numbers = (kinds * np.array([8, 4, 2, 1])).sum(axis=1)
-    for kind in np.unique(kind_numbers).tolist():
+    for kind in numbers_in(kind_numbers).tolist():
         chosen = np.flatnonzero(kind_numbers == kind)
         *is_round, has_arcs, is_clockwise = kinds[chosen[0]].tolist()
         x0, y0, x1, y1, rx, ry = boxes[chosen].T

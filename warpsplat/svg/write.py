@@ -315,7 +315,7 @@ def _check_finite(scene: Scene) -> None:
 MARK = "<!--warpsplat"
 """The beginning of the comment that marks a file as written here."""
 
-UNPRINTABLE = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """Characters that XML cannot hold (XML 1.0, 2.2)."""
 
 

@@ -108,6 +108,23 @@ def words_on_shade() -> FloatArray:
     return image
 
 
+def moon() -> FloatArray:
+    """A mottled grey disc on white: few shades, and a texture."""
+    noise = np.random.default_rng(0).normal(0, 1, (160, 160)).astype(np.float32)
+    soft = sum(side * cv2.GaussianBlur(noise, (0, 0), side) for side in (1, 3))
+    disc = np.hypot(*(np.mgrid[:160, :160] - 79.5)) < 72
+    grey = np.where(disc, np.round(np.clip(130 + 12 * soft, 0, 255)) / 255, 1)
+    return np.repeat(grey[..., None], 3, axis=2).astype(np.float32)
+
+
+def screen_tones() -> FloatArray:
+    """Ink on white, under dots here and under hatches there."""
+    image = draw(BARS, 192, 192)
+    image[:, 160:][np.indices((192, 32)).sum(axis=0) % 4 == 0] = 0
+    image[:, :48][np.arange(192) % 4 < 2] = 0
+    return image
+
+
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -119,6 +136,8 @@ PICTURES = {
     "grainy logo": (grainy(draw(BARS, 192, 192)), "drawing"),
     "grainy photograph": (grainy(0.2 + 0.6 * photograph(192)), "photo"),
     "dithered": (dithered(160), "photo"),
+    "screen tones": (screen_tones(), "drawing"),
+    "moon": (moon(), "photo"),
     "small grey photograph": (small_grey(48), "photo"),
     "small icon": (icon(32), "drawing"),
     "small letters": (letters(), "drawing"),

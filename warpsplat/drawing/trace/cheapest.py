@@ -72,7 +72,7 @@ def cheapest_chains(spans: Spans, tolerance: float) -> CurvePieces:
     order = np.lexsort((both, owner))
     best = order[np.append(True, np.diff(owner[order]) != 0)[: len(order)]]
     best = best[(both[best] < 3 * LINE_COST) | (inner[np.searchsorted(rest, owner[best])] == 1)]
-    rest = np.setdiff1d(rest, owner[best])
+    rest = rest[~np.isin(rest, owner[best])]
     found = [whole.take(is_enough), heads.take(best), tails.take(best)]
     pairs = np.cumsum((last - first)[rest] ** 2)
     for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):

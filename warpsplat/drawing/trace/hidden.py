@@ -67,13 +67,13 @@ class Cover:
 
     def hides_polygon(self, rank: int, polygon: Floats) -> bool:
         """Return whether no region up to a rank is seen in a polygon, pixels on its edge aside."""
-        low = np.floor(polygon.min(axis=0)).astype(np.intp)
-        width, height = np.ceil(polygon.max(axis=0)).astype(np.intp) - low + 1
-        mask = np.zeros((height, width), np.uint8)
+        left, top = low = np.floor(polygon.min(axis=0)).astype(np.intp)
+        right, bottom = np.ceil(polygon.max(axis=0)).astype(np.intp) + 1
+        mask = np.zeros((bottom - top, right - left), np.uint8)
         cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
-        rows, columns = np.nonzero(eroded(mask, 3))
-        inside = np.stack([columns, rows], axis=1) + low + 0.5
-        return bool(self.hides(np.full(len(inside), rank), inside).all())
+        seen = self.ranks[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] <= rank
+        inside = eroded(mask, 3)[max(-top, 0) :, max(-left, 0) :][: seen.shape[0], : seen.shape[1]]
+        return not (inside & seen).any()
 
     def middles(self, rank: Ints, begins: Ints, steps: Ints, trends: Floats) -> Floats:
         """Return points beyond cracks, halfway through what hides a region there, shape (crack, 2).

@@ -10,6 +10,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, channel_max, dilated, eroded
 from warpsplat.drawing.trace.mixtures import MIXED
 from warpsplat.drawing.trace.regions import Regions
+from warpsplat.scene.scene import numbers_in
 
 LEAST_INK = 0.4  # share of an ink in a colour that is taken for a mixture with it
 SOLID = 40  # [px] in a row or area of one colour that is no mixture
@@ -19,7 +20,7 @@ DARKEST = 3  # pixels whose median is the ink
 def with_inks(regions: Regions) -> Regions:
     """Return clean regions with one ink for all thin parts that show more or less of it."""
     painted = regions.paint[regions.labels]
-    flat = [k for k in np.unique(painted).tolist() if regions.colorings[k].ramp is None]
+    flat = [k for k in numbers_in(painted).tolist() if regions.colorings[k].ramp is None]
     colors = {k: regions.colorings[k].color for k in flat}
     solid = [k for k in flat if _is_solid(regions.image, painted == k, colors[k])]
     if not solid or len(solid) == len(flat):

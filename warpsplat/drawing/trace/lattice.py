@@ -15,7 +15,7 @@ SAMPLES = 1024
 """Most rows and columns [px], from the middle of an image, that a period is looked for in."""
 
 TURN = 4096
-"""Steps of a turn: periods are sought among ``TURN`` / whole numbers."""
+"""Steps of a turn, a power of two: periods are sought among ``TURN`` / whole numbers."""
 
 AMPLITUDE = 1 << 14
 """Amplitude of the sine table, in whole numbers: their sums do not depend on the processor."""
@@ -162,9 +162,9 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
     turns = np.arange(int(np.ceil(TURN / longest)), int(TURN / PERIODS[0]) + 1, 1 + (size > SAMPLES // 2))
     lines = np.arange(len(edges)) + first + 1
     some = edges > 0
-    places = turns.astype(np.int32)[:, None] * lines[some].astype(np.int32) % TURN
-    waves = np.stack([(wave[places] * edges[some]).sum(axis=1) for wave in _turn()])
-    coherence = np.sqrt(np.square(waves.astype(np.float64)).sum(axis=0)) / (AMPLITUDE * total)
+    places, weights = turns[:, None] * lines[some] & (TURN - 1), edges[some].astype(np.float64)
+    waves = np.stack([wave.take(places) @ weights for wave in _turn()])
+    coherence = np.sqrt(np.square(waves).sum(axis=0)) / (AMPLITUDE * total)
     if not len(turns) or coherence.max() < COHERENCE:
         return None
     # The longest of the periods that are about as good: the others are fractions of it.
@@ -178,9 +178,9 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
     return _snapped(found, size)
 
 
-def _refined(lines: Ints, weights: Ints, wave: Ints, period: float) -> Axis:
+def _refined(lines: Ints, weights: Ints, wave: Floats, period: float) -> Axis:
     """Return origin and period by least squares, each edge belonging to the nearest line."""
-    cosine, sine = wave.astype(np.float64)
+    cosine, sine = wave
     origin = float(elementary.arctan2(sine, cosine)) / (2 * np.pi) * period
     for _ in range(3):
         numbers = np.round((lines - origin) / period)
@@ -208,10 +208,10 @@ def _snapped(axis: Axis, size: int) -> Axis:
 
 
 @functools.cache
-def _turn() -> Ints:
+def _turn() -> Floats:
     """Return cosine and sine over a turn in whole numbers, shape (2, TURN)."""
     angles = np.arange(TURN) * (2 * np.pi / TURN)
-    return np.round(AMPLITUDE * np.stack([elementary.cos(angles), elementary.sin(angles)])).astype(np.int64)
+    return np.round(AMPLITUDE * np.stack([elementary.cos(angles), elementary.sin(angles)]))
 
 
 def _steps(lines: Ints, *, soft: bool) -> Ints:

@@ -48,7 +48,7 @@ def find_tree(loops: Loops, count: int) -> Tree:
         if loops.is_hole[loop]:
             outer[network] = region
             others = loops.others[loops.first[loop] : loops.first[loop + 1]]
-            touching |= {(int(other), region) for other in np.unique(others)}
+            touching |= {(other, region) for other in set(others.tolist())}
         else:
             inside.setdefault(network, []).append(region)
     children: dict[int, list[list[int]]] = {}

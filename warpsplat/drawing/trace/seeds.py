@@ -15,7 +15,7 @@ from warpsplat.drawing.trace.grids import (
 )
 
 EDGE = 24  # [levels] step between neighbours that is an edge, whatever the noise
-NOISE_QUANTILE = 70  # [%] of the steps beside edges, that measures the noise
+NOISE_QUANTILE = 0.7  # of the steps beside edges, that measures the noise
 
 BEND_OF_NOISE, ROUNDING = 1.7, 0.6
 """How much steps of noise differ over their size, and what rounding to levels adds to that [levels]."""
@@ -49,7 +49,8 @@ def _noise_of_grey(grey: Floats) -> float:
     edge = step > EDGE
     ring = dilated(edge, 13) & ~dilated(edge, 5)
     beside = ring if ring.sum() >= 64 else np.ones_like(ring)
-    noise, bent = (float(np.percentile(change[beside], NOISE_QUANTILE)) for change in (step, bend))
+    some = [np.sort(change[beside]) for change in (step, bend)]
+    noise, bent = (float(values[int(NOISE_QUANTILE * (len(values) - 1))]) for values in some)
     # Steps that are all alike are a gradient, but for a level of rounding; those of noise differ as much.
     return noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - ROUNDING, 0.0)
 

@@ -17,6 +17,7 @@ from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.mixtures import DISTANCE_COST, MIXED
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.portable import elementary, filters
+from warpsplat.scene.scene import numbers_in
 
 SCALES = (4, 3, 2)
 MOST_SUB_PIXELS = 1 << 20  # of the image, which bounds time and memory
@@ -54,7 +55,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     """Return the regions at several times the resolution if many of them are thin."""
     height, width = regions.labels.shape
     scale = _largest_scale(regions)
-    used = np.unique(regions.paint).tolist()
+    used = numbers_in(regions.paint).tolist()
     has_bands = any(regions.colorings[k].is_band for k in used)
     if scale == 1 or regions.noise or has_bands or len(used) > MOST_COLORS:
         return regions
@@ -122,7 +123,7 @@ def _border(labels: Ints) -> int:
 def _shown(regions: Regions) -> dict[int, Floats]:
     """Return each colouring over the image, shape (height, width, 4): gradients by the nearest pixel."""
     painted, shown = regions.paint[regions.labels], {}
-    for k in np.unique(painted).tolist():
+    for k in numbers_in(painted).tolist():
         coloring = regions.colorings[k]
         if coloring.ramp is None:
             shown[k] = np.broadcast_to(coloring.color.astype(np.float32), regions.image.shape)
@@ -134,7 +135,7 @@ def _shown(regions: Regions) -> dict[int, Floats]:
 def _colors_at(shown: dict[int, Floats], which: Ints, rows: Ints, columns: Ints) -> Floats:
     """Return the colours of the colourings ``which`` at pixels, shape (..., 4)."""
     found = np.empty((*which.shape, 4), np.float32)
-    for k in np.unique(which).tolist():
+    for k in numbers_in(which).tolist():
         own = which == k
         found[own] = shown[k][rows[own], columns[own]]
     return found
@@ -143,7 +144,7 @@ def _colors_at(shown: dict[int, Floats], which: Ints, rows: Ints, columns: Ints)
 def _unmixed(regions: Regions, shown: dict[int, Floats]) -> tuple[Ints, _Mixed]:
     """Return the colouring with the larger share in each pixel, and the mixed pixels."""
     painted = regions.paint[regions.labels]
-    numbers = np.unique(painted).tolist()
+    numbers = numbers_in(painted).tolist()
     distances = {k: filters.distance(painted != k) for k in numbers}
     cost = np.full(painted.shape, np.inf, np.float32)
     first, second, share = painted.copy(), painted.copy(), np.ones(painted.shape, np.float32)
@@ -179,7 +180,7 @@ def _thin_share(painted: Ints, mixed: _Mixed) -> float:
     pure = np.ones(painted.shape, np.bool_)
     pure[mixed.rows, mixed.columns] = False
     is_thin = np.zeros(len(mixed.rows), np.bool_)
-    for k in np.unique(painted).tolist():
+    for k in numbers_in(painted).tolist():
         lacks = ~dilated(pure & (painted == k), 3)[mixed.rows, mixed.columns]
         is_thin |= lacks & ((mixed.first == k) | (mixed.second == k))
     return float(is_thin.mean()) if len(is_thin) else 0.0

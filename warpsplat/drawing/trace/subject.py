@@ -47,7 +47,7 @@ LARGEST = 1024  # [px] side of the part in the middle of an image that is inspec
 EDGE = 24  # [levels] step between neighbours from which on there is an edge
 DITHERED = 0.25  # share of pixels on strong edges from which on an image may be dithered
 CROSS = (0, 1), (2, 1), (1, 0), (1, 2)  # offsets of the four neighbours from the upper left of 3x3 pixels
-SPECKLED = 0.03  # share of pixels unlike all their neighbours, above which edges are the dots of a dither
+SPECKLED = 0.055  # share of pixels unlike all their neighbours, above which edges are the dots of a dither
 NEAR_GROUND = 8  # [levels] that a pixel of the ground is off the most frequent colour at the most
 INSIDE, LEAST_INSIDE = (
     5,
@@ -62,6 +62,8 @@ FEW, FLAT, CONTRAST, EVENLY, NEEDED = 8.7, 8.9, 2.5, 3.0, 24.6
 search on 1,245 others for the weight of evenness."""
 EVEN = 0.97  # share of evenly changing pixels, edges aside, above which an image is a drawing
 LEAST_CONTRAST = 4.0  # [stops] below which an image is not less of a drawing
+TEXTURED = 0.37  # share of pixels, away from edges, unlike those around them, above which there is a texture
+UNLIKE = 2  # [levels] from the median of the pixels around
 
 
 def _guess(image: FloatArray) -> Guess:
@@ -91,7 +93,11 @@ def _guess(image: FloatArray) -> Guess:
     evenness = _evenness(part, inside & ~dilated(edges, 3))
     if evenness > EVEN:
         return Guess("drawing", "apart from edges it is flat or evenly shaded")
-    few = _few_colors(part, inside if is_grainy else inside & ~edges, blurs=1 + is_grainy)
+    calm = _calm(part)
+    is_unlike = channel_max(np.abs(part - calm)) >= UNLIKE
+    if (is_unlike & inside & ~dilated(edges, 5)).sum() > TEXTURED * inside.sum():
+        return Guess("photo", "what is away from edges has a texture")
+    few = _few_colors(*((_calm(calm), inside) if is_grainy else (calm, inside & ~edges)))
     flat = float((step[inside] == 0).mean())
     contrast = max(LEAST_CONTRAST, _contrast(part[_densest(np.minimum(step, 2 * EDGE))]))
     is_drawing = FEW * few + FLAT * flat + CONTRAST * contrast + EVENLY * evenness > NEEDED
@@ -187,9 +193,10 @@ def _cells(image: FloatArray, counts: Ints) -> str | None:
 
 def _is_sprite(levels: Ints) -> bool:
     """Return whether a small image is drawn pixel by pixel: in recurring colours, without soft edges."""
+    if not CELLS[0] <= min(levels.shape[:2]) <= max(levels.shape[:2]) <= SPRITE:
+        return False
     counts = _colors(levels)[1]
-    is_small = CELLS[0] <= min(levels.shape[:2]) and max(levels.shape[:2]) <= SPRITE
-    if not is_small or len(counts) < 2:
+    if len(counts) < 2:
         return False
     frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
     if frequent < MOSTLY_FREQUENT * counts.sum() or len(counts) > MOST_COLORS:
@@ -233,14 +240,13 @@ GREY = 4  # [levels] mean difference of the channels below which an image is gre
 NEAR_COLOR = 6  # [levels] distance of a pixel from a colour that it counts as
 
 
-def _few_colors(levels: Ints, inside: Bools, blurs: int) -> float:
-    """Return the share of the pixels ``inside`` near one of few colours, after ``blurs`` by a median.
+def _calm(levels: Ints) -> Ints:
+    """Return the median of the pixels around each one, shape (height, width, channel)."""
+    return np.asarray(cv2.medianBlur(np.ascontiguousarray(levels, np.uint8), 5))
 
-    JPEG leaves it large in drawings.
-    """
-    calm = np.ascontiguousarray(levels.astype(np.uint8))
-    for _ in range(blurs):
-        calm = np.asarray(cv2.medianBlur(calm, 5), np.uint8)
+
+def _few_colors(calm: Ints, inside: Bools) -> float:
+    """Return the share of the pixels ``inside`` near one of few colours; JPEG leaves it large in drawings."""
     rest: Floats = calm[inside].astype(np.float32)
     rest = rest[:: max(1, len(rest) // SAMPLES)]
     total = len(rest)

@@ -15,6 +15,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts
+from warpsplat.scene.scene import numbers_in
 
 ROUNDS = 4  # colours in one thin part, at the most
 MOST_PARTS = 4000  # in a round; an image with more is no drawing
@@ -162,7 +163,7 @@ def _flat_colors_near(labels: Ints, paint: Ints, thin: _ThinPart, colorings: lis
     columns = slice(max(int(x.min()) - NEARBY, 0), int(x.max()) + NEARBY + 1)
     seen = labels[rows, columns]
     seen = seen[(seen != NO_REGION) & (seen < len(paint))]
-    return [i for i in np.unique(paint[seen]).tolist() if colorings[i].ramp is None]
+    return [i for i in numbers_in(paint[seen]).tolist() if colorings[i].ramp is None]
 
 
 def _is_mixture_of_three(pixels: Floats, colors: list[Floats], limit: float) -> bool:

@@ -33,7 +33,7 @@ from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
-from warpsplat.scene.scene import starts_of
+from warpsplat.scene.scene import numbers_in, starts_of
 
 LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
 FEW_REGIONS = 3000  # which any image may have
@@ -167,7 +167,7 @@ def tolerance_of(offsets: Floats, loops: Loops, regions: Regions) -> float:
 def _ground(regions: Regions, tree: Tree, *, may_have_ground: bool) -> tuple[Bools, Coloring | None]:
     """Return which regions are not painted, and the colour of the canvas; None if it is transparent."""
     clear = np.array([coloring.is_clear for coloring in regions.colorings])[regions.paint]
-    opaque = all(regions.colorings[paint].color[3] >= OPAQUE for paint in np.unique(regions.paint))
+    opaque = all(regions.colorings[paint].color[3] >= OPAQUE for paint in numbers_in(regions.paint))
     if not may_have_ground or not opaque or clear.any():
         return clear, None
     painted = regions.paint[regions.labels]
