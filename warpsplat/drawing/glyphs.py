@@ -7,6 +7,7 @@ were drawn for the stripes of a screen's pixels (ClearType), their coloured frin
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -58,9 +59,6 @@ FRINGE, BALANCE, BEND = 0.08, 0.12, 0.4
 WHOLE, HARD = 0.9, 0.1
 """Share of one colour from which on a pixel is no mixture, and of mixtures up to which edges are hard."""
 
-LEVELS = 65535
-"""Of a channel: images have up to 16 bits."""
-
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float64]
@@ -90,8 +88,6 @@ def find_glyphs(image: FloatArray) -> tuple[Sheet | None, FloatArray]:
 
     An image with noise has none. ``image``: as for ``trace``.
     """
-    if noise_of(image * np.float32(255)) >= NEGLIGIBLE_NOISE:
-        return None, image
     glyphs = _different_glyphs(image)
     inks = _inks(glyphs)
     glyphs = [glyph for glyph in glyphs if glyph.key in inks]
@@ -139,33 +135,41 @@ def _different_glyphs(image: FloatArray) -> list[_Glyph]:
 
 
 def _islands(image: FloatArray) -> Iterator[tuple[int, int, Bools, FloatArray]]:
-    """Yield small parts with one plain ground around them: x, y, their pixels in a box, and its colour."""
+    """Yield small parts with one plain ground around them: x, y, their pixels in a box, and its colour.
+
+    There are none if they are few, or the image has noise.
+    """
     height, width, channels = image.shape
-    keys = np.zeros((height, width), np.int64)
-    for channel in np.moveaxis(image, 2, 0):
-        keys = keys << 16 | np.round(channel * LEVELS).astype(np.int64)
-    everywhere = np.ones(keys.shape, np.bool_)
-    count, areas = linked_components(keys[:, 1:] == keys[:, :-1], keys[1:] == keys[:-1], everywhere)
+    layers = [np.ascontiguousarray(channel) for channel in np.moveaxis(image, 2, 0)]
+    across, down = (
+        functools.reduce(np.logical_and, (a[one] == a[other] for a in layers))
+        for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:, :], np.s_[:-1, :]))
+    )
+    count, areas = linked_components(across, down, np.ones((height, width), np.bool_))
     is_ground = (np.bincount(areas.reshape(-1)) >= LEAST_GROUND)[areas]
     if not is_ground.any():
         return
-    nearest, colors = nearest_in(is_ground), image.reshape(-1, channels)
-    is_plain = channel_max(np.abs(image - colors[nearest])) <= NEAR_GROUND
+    nearest = nearest_in(is_ground)
+    is_plain = functools.reduce(
+        np.logical_and, (np.abs(a - a.reshape(-1)[nearest]) <= NEAR_GROUND for a in layers)
+    )
     parts, labels, stats, _ = cv2.connectedComponentsWithStats((~is_plain).astype(np.uint8), connectivity=8)
-    left, top, across, down, _ = stats.T.astype(np.intp)
-    pixel = np.zeros(count, np.intp)
-    pixel[areas.reshape(-1)] = np.arange(areas.size)  # one of each area
+    left, top, wide, high, _ = stats.T.astype(np.intp)
     behind = np.where(is_plain, areas.reshape(-1)[nearest], NO_REGION)
     ground = _grounds(np.asarray(labels, np.intp), behind, parts, count)
-    chosen = (ground >= 0) & (across <= WIDEST) & (down <= HIGHEST)
-    chosen &= (left > 0) & (top > 0) & (left + across < width) & (top + down < height)
+    chosen = (ground >= 0) & (wide <= WIDEST) & (high <= HIGHEST)
+    chosen &= (left > 0) & (top > 0) & (left + wide < width) & (top + high < height)
     chosen[0] = False
-    boxes = np.stack([left - 1, top - 1, left + across + 1, top + down + 1], axis=1)
+    if chosen.sum() < FEWEST or noise_of(image * np.float32(255)) >= NEGLIGIBLE_NOISE:
+        return
+    pixel = np.zeros(count, np.intp)
+    pixel[areas.reshape(-1)] = np.arange(areas.size)  # one of each area
+    boxes = np.stack([left - 1, top - 1, left + wide + 1, top + high + 1], axis=1)
     for number in np.flatnonzero(chosen).tolist():
         x, y, right, bottom = boxes[number].tolist()
         own = labels[y:bottom, x:right] == number
         own |= dilated(own, 3) & (behind[y:bottom, x:right] == ground[number])
-        yield x, y, own, colors[pixel[ground[number]]]
+        yield x, y, own, image.reshape(-1, channels)[pixel[ground[number]]]
 
 
 def _grounds(labels: Ints, grounds: Ints, parts: int, count: int) -> Ints:

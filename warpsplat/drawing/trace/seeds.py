@@ -32,7 +32,9 @@ def noise_of(image: Floats) -> float:
 
     0 for a drawing without noise. On black and on white it is the same, unlike that of shades that fade away.
     """
-    grey = image.max(axis=2) if image.shape[2] == 1 else image[..., :3].mean(axis=2)
+    # Channel by channel: means along an axis of three take ten times as long.
+    first = image[..., 0]
+    grey = first if image.shape[2] == 1 else (first + image[..., 1] + image[..., 2]) / 3
     noise = _noise_of_grey(grey)
     if noise and image.shape[2] == 4 and image[..., 3].min() < 255:
         noise = min(noise, _noise_of_grey(grey + 255 - image[..., 3]))
