@@ -21,7 +21,7 @@ GAP, BORDER = 4, 16
 """Distances on the sheet between glyphs, and from its sides, where outlines may leave it unseen [px]."""
 
 LEAST_WIDTH = 256
-"""Of a sheet [px]."""
+"""Least width of a sheet [px]."""
 
 Ints = npt.NDArray[np.intp]
 
@@ -35,7 +35,7 @@ class Sheet:
     corners: Ints
     """Upper left corner of each glyph on the sheet, x and y, shape (glyph, 2)."""
     sizes: Ints
-    """Shape (glyph, 2)."""
+    """Width and height of each glyph, shape (glyph, 2)."""
     inks: FloatArray
     """Colour of each glyph, premultiplied sRGB and opacity, shape (glyph, 4)."""
     grounds: FloatArray

@@ -52,6 +52,9 @@ LIKE_ANOTHER = 0.85
 FEWEST = 16
 """Different or equal glyphs that are worth a sheet."""
 
+MOST = 8000
+"""Different parts of an image that are looked at: one with more has a texture."""
+
 FRINGE, BALANCE, BEND = 0.08, 0.12, 0.4
 """Shares in red and blue that differ by ``FRINGE`` at least are a fringe if their sums differ by no more than
 ``BALANCE`` of green's, and green is off the mean of the two by no more than ``BEND`` of their difference."""
@@ -127,6 +130,8 @@ def _different_glyphs(image: FloatArray) -> list[_Glyph]:
         height, width = own.shape
         patch = np.where(own[..., None], image[y : y + height, x : x + width], ground)
         key = patch.shape, ground.tobytes(), patch.tobytes()
+        if len(known) > MOST:
+            return []
         if key not in known:
             known[key] = _glyph(patch.astype(np.float64) * 255, ground.astype(np.float64) * 255)
         if glyph := known[key]:
