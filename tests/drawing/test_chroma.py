@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +11,7 @@ from PIL import Image
 from tests.drawing.trace.drawings import draw_exactly, ground
 from tests.runs import vectorize
 from warpsplat.drawing import chroma
-from warpsplat.drawing.chroma import finish_by_lightness, has_blurred_colors
-from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.tidy import Finished
-from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.problem import Run
+from warpsplat.drawing.chroma import has_blurred_colors
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -63,22 +58,3 @@ def test_outlines_follow_the_lightness(
     by_lightness = error()
     monkeypatch.setattr(chroma, "CHROMA_WEIGHT", 1.0)
     assert by_lightness < 0.5 * error()
-
-
-def test_a_poor_fit_by_lightness_gives_way_to_a_nearer_one(
-    image: FloatArray, device: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    target, calls = as_jpeg(image, 2), list[FloatArray]()
-    traced = trace(target)
-    drawing = Drawing(traced.scene, traced.joints)
-
-    def finish(target: FloatArray, drawing: Drawing, run: Run) -> Finished:
-        """Move the outlines of the first drawing, by lightness, away."""
-        calls.append(target)
-        points = drawing.scene.points + np.float32(9 * (len(calls) == 1))
-        return Finished(replace(drawing, scene=replace(drawing.scene, points=points)), 8.0, 20.0)
-
-    monkeypatch.setattr(chroma, "finish_drawing", finish)
-    made = finish_by_lightness(target, drawing, Run(lambda: Backend.on(device)))
-    np.testing.assert_array_equal(made.drawing.scene.points, drawing.scene.points)
-    assert calls[1] is target

@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.fit_outlines import matching
 from warpsplat.drawing.tidy import Finished, finish_drawing
 from warpsplat.drawing.trace.regions import NEGLIGIBLE_NOISE
 from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.fit.problem import Run
-from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 
 LIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
@@ -26,10 +23,6 @@ BLURRED = 0.75
 
 CHROMA_WEIGHT = 0.25
 """Weight of what is blurred: some, as colours may be of one lightness."""
-
-
-POOR = 36.0
-"""PSNR of a fit by lightness [dB], below which one by colours is made too, and the nearer one taken."""
 
 
 def finish_by_lightness(target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
@@ -44,15 +37,7 @@ def finish_by_lightness(target: FloatArray, drawing: Drawing, run: Run, **option
     dull = replace(scene, colors=_dull(scene.colors), stop_colors=_dull(scene.stop_colors), canvas=canvas)
     done = finish_drawing(_dull(target), replace(drawing, scene=dull), run, **options)
     own = {name: getattr(scene, name) for name in ("colors", "stop_colors", "canvas")}
-    made = [done._replace(drawing=replace(done.drawing, scene=replace(done.drawing.scene, **own)))]
-    if done.psnr < POOR and not run.over():
-        made.append(finish_drawing(target, drawing, replace(run, on_progress=None), **options))
-
-    def apart(one: Finished) -> float:
-        shown = render(one.drawing.scene, backend=run.backend)
-        return float(squares(_dull(shown - matching(target, scene.canvas))).mean())
-
-    return (min(made, key=apart) if len(made) > 1 else made[0])._replace(psnr=np.nan)
+    return done._replace(drawing=replace(done.drawing, scene=replace(done.drawing.scene, **own)), psnr=np.nan)
 
 
 def has_blurred_colors(image: FloatArray) -> bool:
