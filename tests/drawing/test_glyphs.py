@@ -9,7 +9,10 @@ import numpy.typing as npt
 import pytest
 
 import warpsplat
+from warpsplat.drawing.draft import glyphs_of
 from warpsplat.drawing.glyphs import find_glyphs
+from warpsplat.fit.problem import Problem
+from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Scene
 
 Floats = npt.NDArray[np.float64]
@@ -122,9 +125,11 @@ def test_a_page_of_letters_is_drawn_with_equal_outlines(quality: str) -> None:
 
 @pytest.mark.parametrize("limit", [{"curves": 12}, {"colors": 4}, {"max_bytes": 4000}, {"detail": 0.2}])
 def test_what_is_limited_is_drawn_as_a_whole(limit: dict[str, float]) -> None:
-    made = warpsplat.vectorize(page(), subject="drawing", quality="draft", threads=1, **limit)
-    free = warpsplat.vectorize(page(), subject="drawing", quality="draft", threads=1)
-    assert made.svg != free.svg
+    image = page()
+    assert glyphs_of(Problem(image, make_settings()))[0]
+    sheet, rest = glyphs_of(Problem(image, make_settings(**limit)))
+    assert sheet is None
+    assert np.array_equal(rest, image)
 
 
 def test_nothing_drawn_on_a_sheet_adds_nothing() -> None:

@@ -6,6 +6,7 @@ import logging
 import math
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.chroma import finish_by_lightness
@@ -59,13 +60,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         announce_fit(len(traced.joints) // 3, problem)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
-    finish = partial(
-        finish_by_lightness,
-        original(problem.target),
-        finest=finest(settings),
-        price=byte_price(settings),
-        symbols=settings.symbols,
-    )
+    finish = partial(_finish, settings, original(problem.target))
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
         sketch = _sketch(problem, run, done)
@@ -73,15 +68,28 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         return sketch if best is sketch.fit else Sketch(best, _size(best, settings), None)
 
     def fewer(count: int) -> Sketch:
-        return sketch_of(finish(trace_regions(problem, run, count), next(parts), tidy=settings.tidy), count)
+        return sketch_of(finish(trace_regions(problem, run, count), next(parts)), count)
 
     def simpler(drawing: Drawing, price: float) -> Sketch:
-        return _sketch(problem, run, finish(drawing, next(parts), price=price * byte_price(settings)))
+        return _sketch(
+            problem, run, finish(drawing, next(parts), tidy=True, price=price * byte_price(settings))
+        )
 
-    first = sketch_of(finish(traced, next(parts), tidy=settings.tidy), most)
+    first = sketch_of(finish(traced, next(parts)), most)
     if not limit or first.size <= limit:
         return first.fit
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
+
+
+def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
+    """Finish a drawing as ``finish_by_lightness``, as the settings say where ``options`` do not."""
+    usual = {
+        "finest": finest(settings),
+        "tidy": settings.tidy,
+        "price": byte_price(settings),
+        "symbols": settings.symbols,
+    }
+    return finish_by_lightness(target, drawing, run, **(usual | options))
 
 
 def _drawn_with_sheet(problem: Problem, run: Run, sheet: Sheet, rest: FloatArray) -> Fit:
@@ -100,18 +108,9 @@ def _drawn_with_sheet(problem: Problem, run: Run, sheet: Sheet, rest: FloatArray
     grid, runs = None, run.open_parts()
     glyphs_first = nodes[0] >= nodes[1]
     for drawing, image, times in parts if glyphs_first else parts[::-1]:
-        done = finish_by_lightness(
-            image,
-            drawing,
-            next(runs),
-            finest=finest(settings),
-            tidy=settings.tidy,
-            price=byte_price(settings),
-            symbols=settings.symbols,
-            grid=grid,
-            # What does not count in all of the image, in pixels of this part.
-            negligible=LEAST_ERROR * max(rest[..., 0].size / (times * image[..., 0].size), 1.0),
-        )
+        # What does not count in all of the image, in pixels of this part.
+        negligible = LEAST_ERROR * max(rest[..., 0].size / (times * image[..., 0].size), 1.0)
+        done = _finish(settings, image, drawing, next(runs), grid=grid, negligible=negligible)
         grid = done.per_pixel
         scenes.append(done.drawing.scene)
     glyphs, others = scenes if glyphs_first else scenes[::-1]
@@ -152,12 +151,8 @@ def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
     """Draw the image continued beyond its borders, and cut the drawing."""
     across, down = margins(problem.target, THIN_SIDE)
     wide = replace(problem, target=continued(problem.target, across, down))
-    settings = problem.settings
-    drawing, grid = trace_regions(wide, run, most), finest(settings)
-    price = byte_price(settings)
-    done = finish_by_lightness(
-        original(wide.target), drawing, run, finest=grid, tidy=settings.tidy, price=price
-    )
+    drawing = trace_regions(wide, run, most)
+    done = _finish(problem.settings, original(wide.target), drawing, run, symbols=False)
     made = _sketch(wide, run, done).fit
     return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
 

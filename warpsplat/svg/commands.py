@@ -183,9 +183,9 @@ class Rings:
             move = min(moves, key=len) if drawn[:1].isalpha() else moves[0]
             return move + drawn, plus(last, origin)
         text, end = shortest_ring(pen, segments)
-        if move_found := MOVE.match(text):
-            letter, x, y = move_found.groups()
-            drawn = text[move_found.end() :]
+        if found := MOVE.match(text):
+            letter, x, y = found.groups()
+            drawn = text[found.end() :]
             if drawn.islower() and (letter == "m" or drawn[0].isalpha()):
                 start = plus((int(x), int(y)), (pen or (0, 0)) if letter == "m" else (0, 0))
                 self._known[key] = minus(start, origin), drawn, minus(end, origin)

@@ -39,7 +39,7 @@ class _Piece:
     error: float
     """Sum of the squared errors over all pixels and channels [levels squared]."""
     halves: list[_Piece] = field(default_factory=list)
-    """What it may be cut into."""
+    """The pieces that it may be cut into."""
 
     def box(self) -> tuple[slice, slice]:
         """Return the rows and columns of the bounding box."""

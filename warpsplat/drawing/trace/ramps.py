@@ -19,10 +19,8 @@ LEAST_SLOPES = 8  # pixels where the slope is known, at the least
 RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
 SPAN = 3  # [px] over which the slope is taken, to each side
 BLUR = 1.5  # [px] standard deviation of the filter before that
-BINS, BIN = (
-    48,
-    1.0,
-)  # places along a ramp where its colour is measured, and how far apart they are at least [px]
+BINS = 48  # places along a ramp where its colour is measured, at the most
+BIN = 1.0  # [px] how far apart these are, at least
 STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 OFF = 1.0  # [levels] of the colours between two stops from a straight line, at the most
 MOST_STOPS = 8
