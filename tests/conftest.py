@@ -1,4 +1,7 @@
-"""One suite, the device chosen outside: ``pytest --device cuda:0``; by default every device found."""
+"""One suite, the device chosen outside: ``pytest --device cuda:0``; by default every device found.
+
+``--device fake-cuda`` is a CUDA device without a GPU, see ``tests/fake_cuda``.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,11 @@ from typing import Any
 
 # Fixed before Warp reads it, so that kernels are compiled once and kept between runs of the suite.
 os.environ.setdefault("WARP_CACHE_PATH", str(Path(tempfile.gettempdir()) / "warpsplat-test-kernels"))
+
+from tests import fake_cuda
+from tests.fake_cuda import plugin  # before Warp is imported
+
+# isort: split
 
 import numpy as np
 import pytest
@@ -31,7 +39,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        "--device", action="append", default=None, help="Warp devices to test (default: all here)"
+        "--device",
+        action="append",
+        default=None,
+        help=f"Warp devices to test (default: all here); {fake_cuda.NAME}: see tests/fake_cuda",
     )
     parser.addoption(
         "--gpu-lanes", action="store_true", help="divide tiles on a CPU as on a GPU, which rounds differently"
@@ -52,6 +63,8 @@ def pytest_configure(config: pytest.Config) -> None:
     A test whose bound holds for one series of random numbers only would fail on a machine that rounds
     otherwise; ``--fit-seed`` finds it here.
     """
+    if plugin.ACTIVE:
+        config.pluginmanager.register(plugin)
     if config.getoption("--gpu-lanes"):
         from tests.lanes import divide_as_on_gpu  # imports the package
 
@@ -114,4 +127,4 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "device" in metafunc.fixturenames:
         names = metafunc.config.getoption("--device") or [str(d) for d in wp.get_devices()]
-        metafunc.parametrize("device", names)
+        metafunc.parametrize("device", ["cuda:0" if name == fake_cuda.NAME else name for name in names])

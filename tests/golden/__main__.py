@@ -6,7 +6,10 @@ import argparse
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.golden.cases import ALL_CASES, CASES, digest_of, text_of
+from tests.lanes import divide_as_on_gpu
 
 EXPECTED = Path(__file__).with_name("digests.json")
 
@@ -15,6 +18,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.golden", description=__doc__)
     parser.add_argument("cases", nargs="*", help="names of cases; default: all")
     parser.add_argument("--threads", type=int, help="CPU threads; default: all cores")
+    parser.add_argument("--device", default="cpu", help="default: cpu; others round differently")
+    parser.add_argument("--gpu-lanes", action="store_true", help="divide tiles on the CPU as on a GPU")
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="write the SVGs here as well")
     parser.add_argument(
         "--update", action="store_true", help=f"write {EXPECTED.name}, which the tests expect"
@@ -25,9 +30,11 @@ def main() -> None:
         parser.error(f"no such case: {', '.join(unknown)}")
     if given.save:
         given.save.mkdir(parents=True, exist_ok=True)
+    if given.gpu_lanes:
+        divide_as_on_gpu(pytest.MonkeyPatch())
     digests = {}
     for name in given.cases or CASES:
-        svg = text_of(name, given.threads)
+        svg = text_of(name, given.threads, given.device)
         digests[name] = digest_of(svg)
         print(json.dumps({name: digests[name]}), flush=True)
         if given.save:

@@ -63,10 +63,10 @@ CASES = {
 """Those whose renderer is there."""
 
 
-def text_of(name: str, threads: int | None = None) -> str:
+def text_of(name: str, threads: int | None = None, device: str = "cpu") -> str:
     """Return the SVG of a case."""
     picture, given = CASES[name]
-    given = {"device": "cpu", "threads": threads, **given}
+    given = {"device": device, "threads": threads, **given}
     if "importance" in given:
         mask = PICTURES[given["importance"]]()
         height, width = PICTURES[picture]().shape[:2]
