@@ -66,6 +66,20 @@ print(result.svg)
 """A program that continues a run, and stops it after some steps; on a CPU as a GPU divides."""
 
 
+SERVED = """
+from tests.pages.serve.helpers import Visitor, picture
+with Visitor(device="cuda:0") as visitor:
+    settings = {"curves": 4, "subject": "photo", "quality": "draft"}
+    run = visitor.over(visitor.begin(visitor.upload(picture()), **settings))
+    print(run["state"])
+"""
+
+
+def test_a_run_of_the_page(tmp_path: Path) -> None:
+    done = fake_cuda.run("-c", SERVED, cwd=tmp_path)
+    assert done.stdout == "done\n", done.stderr
+
+
 @pytest.mark.parametrize("devices", [("cpu", "cuda:0"), ("cuda:0", "cpu")])
 def test_a_checkpoint_goes_from_device_to_device(photo: Path, devices: tuple[str, str]) -> None:
     first, second = devices

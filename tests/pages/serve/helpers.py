@@ -55,8 +55,10 @@ def held(store: Store) -> dict[str, int]:
 class Visitor:
     """A page's requests to a server, which it starts; a context manager."""
 
-    def __init__(self, limits: Limits | None = None, max_memory: str | None = None) -> None:
-        self.server = WarpsplatServer("127.0.0.1", 0, Machine("cpu", 1, max_memory), limits or Limits())
+    def __init__(
+        self, limits: Limits | None = None, max_memory: str | None = None, device: str = "cpu"
+    ) -> None:
+        self.server = WarpsplatServer("127.0.0.1", 0, Machine(device, 1, max_memory), limits or Limits())
         self.store = self.server.store
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.server.port}", timeout=LONGEST)
         self._ends, begun = threading.Event(), threading.Event()
