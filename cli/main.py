@@ -104,8 +104,8 @@ def cli() -> None:
     \b
     Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
     or checkpoint, 4 result could not be written, 5 some images of a batch failed,
-    6 a goal was missed, 7 not enough memory, threads or kernel cache, 130
-    interrupted, 143 terminated.
+    6 a goal was missed, 7 not enough memory, threads or kernel cache, or a GPU
+    that cannot be used or failed, 130 interrupted, 143 terminated.
     """  # noqa: D301
 
 

@@ -233,7 +233,7 @@ def test_what_is_public_is_there_and_light() -> None:
         *("starting_scene", "load_image", "vectorize_several", "suggest", "CustomLoss"),
         *("Result", "Score", "Progress", "Snapshot", "Settings", "Scene", "Canvas", "__version__"),
         *("Suggestion", "Expected", "CustomLoss"),
-        *("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"),
+        *("WarpsplatError", "DeviceError", "ImageError", "OutputError", "ResourceError", "UsageError"),
     }
     public |= {name for name, home in EXTENSIONS_OF.items() if home in extensions()}
     assert set(warpsplat.__all__) == public == set(dir(warpsplat))

@@ -24,6 +24,7 @@ from warpsplat.extensions import declared
 
 if TYPE_CHECKING:
     from warpsplat.batch.presets import load_preset as load_preset
+    from warpsplat.errors import DeviceError as DeviceError
     from warpsplat.errors import ImageError as ImageError
     from warpsplat.errors import OutputError as OutputError
     from warpsplat.errors import ResourceError as ResourceError
@@ -64,7 +65,8 @@ _HOMES = {
     **dict.fromkeys(("load_image", "starting_scene"), "warpsplat.run.prepare"),
     **dict.fromkeys(("load_svg", "save_svg", "score"), "warpsplat.run.svg"),
     **dict.fromkeys(
-        ("WarpsplatError", "ImageError", "OutputError", "ResourceError", "UsageError"), "warpsplat.errors"
+        ("WarpsplatError", "DeviceError", "ImageError", "OutputError", "ResourceError", "UsageError"),
+        "warpsplat.errors",
     ),
     **dict.fromkeys(("Settings", "make_settings"), "warpsplat.fit.settings"),
     **dict.fromkeys(("Canvas", "Scene"), "warpsplat.scene"),

@@ -9,6 +9,7 @@ import contextlib
 import errno
 from collections.abc import Iterator
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -28,7 +29,7 @@ class ExitCode(IntEnum):
     GOAL_MISSED = 6
     """The file is written, but a goal was missed."""
     RESOURCES = 7
-    """Memory, threads or the kernel cache do not suffice."""
+    """Memory, threads or the kernel cache do not suffice, or a device cannot be used."""
     INTERRUPTED = 130
     """By Ctrl-C (128 + SIGINT); the best so far is written."""
     TERMINATED = 143
@@ -66,9 +67,18 @@ class OutputError(WarpsplatError):
 
 
 class ResourceError(WarpsplatError):
-    """A lack of memory, threads, or space for compiled kernels."""
+    """A lack of memory, threads, or space for compiled kernels; a device that cannot be used."""
 
     exit_code = ExitCode.RESOURCES
+
+
+class DeviceError(ResourceError):
+    """A GPU that cannot be used, a device that failed, or whose memory does not suffice."""
+
+    result: Any = None
+    """The ``Result`` that a run had by then; None: there was none."""
+    is_lost: bool = False
+    """Whether this process cannot use the device any more."""
 
 
 class CapacityError(ResourceError):

@@ -5,39 +5,63 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 _lock = threading.Lock()
 _hiding = 0
 """Threads that hide messages."""
 _saved = -1
 """A copy of the process's standard error, meanwhile."""
+_hidden: IO[bytes] | None = None
+"""The file that it goes to, meanwhile."""
 
 
 @contextlib.contextmanager
-def messages_hidden() -> Iterator[None]:
-    """Discard what goes to the process's standard error: native code writes there behind Python's back.
+def messages_hidden() -> Iterator[list[str]]:
+    """Hide what goes to the process's standard error: native code writes there behind Python's back.
 
-    It comes back when the last of all threads that ask for this is done.
+    It comes back when the last of all threads that ask for this is done. Yields a list to which the lines
+    that were hidden are added at the end of the block.
     """
-    global _hiding, _saved  # noqa: PLW0603 - a process has one standard error
+    global _hiding, _saved, _hidden  # noqa: PLW0603 - a process has one standard error
+    said: list[str] = []
     with _lock:
         if not _hiding:
             with contextlib.suppress(OSError):  # else it is shown
                 _saved = os.dup(2)
-                discard_output(2)
+                _hidden = _put_aside(2)
         _hiding += 1
+        begin = _hidden.seek(0, os.SEEK_END) if _hidden else 0
     try:
-        yield
+        yield said
     finally:
         with _lock:
+            if _hidden:
+                _hidden.seek(begin)
+                said += _hidden.read().decode(errors="replace").splitlines()
             _hiding -= 1
             if not _hiding and _saved >= 0:
                 os.dup2(_saved, 2)
                 os.close(_saved)
                 _saved = -1
+            if not _hiding and _hidden:
+                _hidden.close()
+                _hidden = None
+
+
+def _put_aside(descriptor: int) -> IO[bytes] | None:
+    """Have all that is written to a file descriptor go to a file, or be discarded where there can be none."""
+    try:
+        file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - stays open
+    except OSError:
+        discard_output(descriptor)
+        return None
+    os.dup2(file.fileno(), descriptor)
+    return file
 
 
 def discard_output(descriptor: int) -> None:

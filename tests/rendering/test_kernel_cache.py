@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import warp as wp
 
-from warpsplat.errors import ResourceError
+from tests import fake_cuda
+from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
 from warpsplat.rendering import kernel_cache
+from warpsplat.rendering.cuda import runtime
 from warpsplat.rendering.kernel_cache import CHECKSUMS, LOCK, alone_with, load
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
@@ -28,6 +32,8 @@ def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-u
 
 
 CPU = wp.get_device("cpu")
+
+NAMESPACE = 'xmlns="http://www.w3.org/2000/svg"'
 
 
 @pytest.fixture
@@ -137,3 +143,107 @@ def test_a_module_is_compiled_by_one_process(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [LOCK]
     with alone_with(tmp_path / "none" / "wp_one"):
         pass
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the threads in which modules are compiled."""
+    threads: list[str] = []
+    build = wp._src.build.build_cpu
+
+    def noted(*arguments: Any, **named: Any) -> Any:
+        threads.append(threading.current_thread().name)
+        return build(*arguments, **named)
+
+    monkeypatch.setattr(wp._src.build, "build_cpu", noted)
+    return threads
+
+
+def test_what_another_processor_left_is_compiled_anew_by_the_compiler(
+    cache: Path, compiled: list[str]
+) -> None:
+    """In its thread, with a message and the lock; a folder of the module alone is not enough."""
+    assert doubles()
+    own = find(cache, ".o")
+    own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
+    assert doubles()
+    assert compiled == ["warpsplat compiler"] * 2
+    assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
+
+
+DEVICES = """
+import sys
+from warpsplat.kernels import lanes
+from warpsplat.rendering import kernel_cache
+from warpsplat.rendering.device import choose_device, start_warp
+
+start_warp()
+compile_by = kernel_cache.compile_by
+kernel_cache.compile_by = lambda work: (print("compiled"), compile_by(work))
+for name in sys.argv[1:]:
+    kernel_cache.load(lanes.lane_sums, choose_device(name))
+    print(name)
+"""
+
+
+@pytest.mark.slow
+def test_each_kind_of_device_has_a_binary_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder that they share: a CPU, GPUs of two architectures, an older driver, which takes no PTX."""
+    monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path))
+    done = fake_cuda.run("-c", DEVICES, "cpu", "cuda:0", "cuda:1", devices=2)
+    assert done.stdout.split() == ["compiled", "cpu", "compiled", "cuda:0", "cuda:1"], done.stderr
+    for options, ending in (({"arch": 80}, ".sm80.ptx"), ({"driver": 13000}, ".sm90.cubin")):
+        done = fake_cuda.run("-c", DEVICES, "cuda:0", **options)
+        assert done.stdout.split() == ["compiled", "cuda:0"], done.stderr
+        assert find(tmp_path, ending)
+
+
+def test_what_a_compiler_refuses_is_shown_in_its_words(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Once: another try, or another folder, would not help."""
+    tries: list[int] = []
+
+    def refuse(*_: Any, **__: Any) -> None:
+        tries.append(1)
+        os.write(
+            2, b"In file included from double.cpp:1:\ndouble.cpp:7:3: error: unknown type 'floot'\n1 error\n"
+        )
+        raise Exception("CPU kernel build failed with error code 1")
+
+    monkeypatch.setattr(wp._src.build, "build_cpu", refuse)
+    with pytest.raises(DeviceError, match=r"cannot be compiled for the CPU: .*: error: unknown type 'floot'"):
+        doubles()
+    assert len(tries) == 1 and "WARP_CACHE_PATH" not in caplog.text
+
+
+def test_a_module_that_cannot_be_loaded_although_it_is_whole(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert doubles()
+    good = find(cache, ".o").read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(runtime().llvm, "wp_load_obj", lambda *_: 1)
+        with pytest.raises(
+            DeviceError, match=r"kernels cannot be loaded on the CPU: Failed to load CPU module"
+        ):
+            doubles()
+    assert find(cache, ".o").read_bytes() == good, "it was loaded before, so that it is not damaged"
+    assert doubles()
+
+
+@pytest.mark.parametrize(
+    ("fail", "words"),
+    [("load", "loaded on cuda:0 (Test device): "), ("compile", "compiled for cuda:0 (Test device): ")],
+)
+def test_what_a_gpu_refuses_is_shown_in_its_words(
+    fail: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path))
+    (tmp_path / "a.svg").write_text(f'<svg {NAMESPACE} width="20" height="20"><path d="M2 2h9v9z"/></svg>')
+    command = ("-m", "warpsplat", "render", "a.svg", "-o", "a.png", "--renderer", "exact")
+    done = fake_cuda.run(*command, "--device", "cuda:0", fail=fail, cwd=tmp_path)
+    assert done.returncode == 7, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"warpsplat: kernels cannot be {words}") and "kernel cache" not in line
+    assert line.endswith("--device cpu does without")

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+import warp as wp
 
 import warpsplat
 from tests.scenes import random_scene
 from warpsplat.errors import ResourceError, UsageError
 from warpsplat.rendering import backend, memory
+from warpsplat.rendering.backend import Viewport
+from warpsplat.rendering.memory import check_memory
 from warpsplat.scene import Kind
 
 SCENE = random_scene(Kind.FILL, width=40, height=40)
@@ -74,3 +79,11 @@ def test_sides_beyond_any_number() -> None:
             WAYS[way](10**400)
     with pytest.raises(ResourceError, match="GB"):
         warpsplat.render(SCENE, scale=1e300, device="cpu")
+
+
+def test_on_a_gpu_what_is_free_counts() -> None:
+    """Others may have taken the rest."""
+    gpu = cast(wp.Device, SimpleNamespace(is_cpu=False, free_memory=10**9, total_memory=10**11))
+    check_memory(Viewport(4000, 4000), gpu)
+    with pytest.raises(ResourceError, match=r"a picture of 5000x5000 px would take about 1\.2 GB, .* 900 MB"):
+        check_memory(Viewport(5000, 5000), gpu)

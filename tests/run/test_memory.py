@@ -6,10 +6,13 @@ import gc
 import io
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
 import pytest
+import warp as wp
 from PIL import Image
 
 import warpsplat
@@ -21,11 +24,21 @@ from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.native import container_limits
 from warpsplat.portable.filters import boxed
+from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.run import memory
-from warpsplat.run.memory import factor_for, mask_factor, memory_limit, need
+from warpsplat.run.memory import (
+    DeviceMemory,
+    check_refined,
+    factor_for,
+    mask_factor,
+    memory_limit,
+    need,
+    need_on_gpu,
+)
+from warpsplat.run.prepare import prepare
 
 HUGE = ImageFacts(12_000, 9_000, 3, 4, drafts=True)
 QUICK = {"iterations": 2, "curves": 4, "subject": "photo", "device": "cpu"}
@@ -242,3 +255,44 @@ def test_nothing_of_a_run_is_left() -> None:
         assert living() == before
     finally:
         gc.enable()
+
+
+def test_the_memory_of_a_gpu_limits_the_size_too() -> None:
+    for limit in (400 << 20, 150 << 20, 60 << 20):
+        factor = factor_for(HUGE, Settings(), "huge.jpg", gpu=DeviceMemory("cuda:0", limit))
+        assert need_on_gpu(HUGE, Settings(), factor) <= limit
+        assert factor == 1 or need_on_gpu(HUGE, Settings(), factor // 2) > limit
+    words = (
+        r"^huge\.jpg: at least \d+ MB are needed, free memory of cuda:1 for it is 1 MB; .*--device cpu none"
+    )
+    with pytest.raises(ResourceError, match=words):
+        factor_for(HUGE, Settings(), "huge.jpg", gpu=DeviceMemory("cuda:1", 1 << 20))
+    data = encoded(pixels())
+    with pytest.raises(
+        ResourceError, match=r"65x49 pixels take about .*, free memory of cuda:0 .*; refine against"
+    ):
+        check_refined(data, Settings(), "a.png", DeviceMemory("cuda:0", 1 << 20))
+    check_refined(data, Settings(), "a.png", DeviceMemory("cuda:0", 1 << 30))
+
+
+def test_what_is_free_on_a_gpu_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warp.synchronize_device", lambda _: None)
+    for processes, limit in ((1, 9 * 10**8), (3, 3 * 10**8)):
+        monkeypatch.setattr(memory.Sharing, "processes", processes)
+        device = SimpleNamespace(is_cpu=False, alias="cuda:0", free_memory=10**9, __str__=lambda: "cuda:0")
+        found = DeviceMemory.of(cast(wp.Device, device))
+        assert found and found.limit == limit
+    assert DeviceMemory.of(wp.get_device("cpu")) is None
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_what_needs_no_device_starts_none(quality: str) -> None:
+    """The draft of a drawing is traced on the host, so that no GPU limits its size."""
+    started: list[int] = []
+
+    def backend() -> Backend:
+        started.append(1)
+        return Backend.on("cpu")
+
+    prepare(encoded(pixels()), make_settings(subject="drawing", quality=quality), backend=backend)
+    assert bool(started) == (quality != "draft")

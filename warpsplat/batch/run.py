@@ -191,8 +191,9 @@ class Batch:
         self._on_outcome(JobOutcome(job, status, task.figures or outcome.figures, error))
 
     def _note(self, job: BatchJob, outcome: Outcome, event: Event, error: str = "") -> None:
-        """Append an entry to the manifest; a stopped result is ours, but not the job's."""
-        key = STOPPED if outcome.status == "stopped" else outcome.key
+        """Append an entry to the manifest; a result that was cut short is ours, but not the job's."""
+        cut_short = outcome.data is not None and outcome.status in ("stopped", "failed")
+        key = STOPPED if cut_short else outcome.key
         name, image = self.manifest.name(job.output), str(job.image)
         made = "" if outcome.data is None else digest(outcome.data)
         self.manifest.append(Entry(name, key, event, made, image, error, outcome.figures))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpsplat.errors import DeviceError
 from warpsplat.fit.budget import Budget, affordable
 from warpsplat.fit.checkpoint import Content, number
 from warpsplat.fit.custom_loss import CustomLoss
@@ -39,8 +41,11 @@ from warpsplat.fit.schedule import (
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
+from warpsplat.rendering.failures import failures_of
 from warpsplat.scene import Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
+from warpsplat.scene.geometry import most_seen
+from warpsplat.svg.write import GRIDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +100,20 @@ def fit(
             with checkpoint.reading():
                 return _fit_from(checkpoint.result, scene)
     training = _Training(problem, run, start, rounding, palette)
+    try:
+        with failures_of(run.backend.device):
+            return _trained(training, scene, rng)
+    except DeviceError as failure:
+        kept = training.kept()
+        if kept is None:
+            raise
+        run.failures.append(failure)
+        return kept
+
+
+def _trained(training: _Training, scene: Scene, rng: np.random.Generator) -> Fit:
+    """Return the result of a fit that begins with ``scene``, or continues from the run's checkpoint."""
+    run, checkpoint = training.run, training.run.checkpoint
     if checkpoint and checkpoint.state:
         with checkpoint.reading():
             training.resume(checkpoint.state, scene)
@@ -231,6 +250,8 @@ class _Training:
         densifies = missing or done < settings.density.stop * settings.iterations
         if due and done < settings.iterations and densifies:
             self.step = densify(step, grows=self.grows)
+        elif done % EVALUATE_INTERVAL == 0:
+            state.scene()  # so that the host knows it, whatever happens to the device
 
     def _round(self, rounding: Rounding) -> None:
         """Round and hold what is due after the steps so far."""
@@ -281,6 +302,26 @@ class _Training:
             interrupted=False,
             renewed=state.renewed,
         )
+
+    def kept(self) -> Fit | None:
+        """Return the last shapes that can be had after the device failed; None: there are none yet."""
+        begin, below, step = self.start.begin, self.start.below, getattr(self, "step", None)
+        known = begin, below if below is not None else self.start.scene
+        if step:
+            state = step.state
+            with contextlib.suppress(RuntimeError):  # the device's memory may be lost
+                if not state.known or state.known[0] < state.step:  # else shapes may be half replaced
+                    now = state.parameters.scene()
+                    state.known = (state.step, now) if now.is_finite else state.known
+            if state.known and state.known[0] > begin:
+                known = state.known
+        done, scene = known
+        if scene is None:
+            return None
+        if self.grows:
+            scene = most_seen(scene, self.base + self.settings.curves, self.base)
+        per_pixel = step.state.per_pixel if step else GRIDS[-1]
+        return Fit(scene, per_pixel, math.nan, math.nan, done - begin, interrupted=True)
 
 
 def work_done(settings: Settings, plan: list[Phase], step: int, begin: int = 0) -> float:

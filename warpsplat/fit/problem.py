@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from warpsplat.errors import Stopped
+from warpsplat.errors import DeviceError, Stopped
 from warpsplat.fit.checkpoint import Checkpoint
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.progress import Callback, Progress
@@ -65,6 +65,8 @@ class Run:
     """Keeps the state, so that the run can be resumed; None with a deadline, which no two runs reach in the
     same number of steps.
     """
+    failures: list[DeviceError] = field(default_factory=list)
+    """Failures of the device, after which a run ends with what the host knows; shared by all its parts."""
     started: float = field(default_factory=time.monotonic)
     _ended: bool = field(default=False, init=False)
     """Whether ``on_progress`` asked for the end."""
@@ -75,8 +77,8 @@ class Run:
         return self.device() if callable(self.device) else self.device
 
     def stopped(self) -> bool:
-        """Return whether the user wants the run to end."""
-        return self._ended or bool(self.stop and self.stop())
+        """Return whether the user wants the run to end, or its device failed."""
+        return self._ended or bool(self.failures) or bool(self.stop and self.stop())
 
     def over(self) -> bool:
         """Return whether the run has to end, since it was stopped or its time is up."""

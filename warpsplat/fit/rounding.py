@@ -116,7 +116,7 @@ def freeze_opacities(step: Step) -> None:
         return
     step.renderer.forward_complete()
     worth = np.maximum(step.objective.quadratic().removal_costs(), 0)
-    scene = parameters.scene()
+    scene = step.state.scene()
     cost = OPAQUE_COST * worth * ((1 - scene.opacities) / scene.opacities) ** 2
     size = len(export(scene, step.settings, min(USUAL_GRID, finest(step.settings))))
     opaque = cost < OPACITY_BYTES * byte_worth(step.objective.value(), size)
@@ -130,7 +130,7 @@ def freeze_opacities(step: Step) -> None:
 def freeze_stage(step: Step, stage: int) -> None:
     """Round and freeze all widths and the points that belong to the stages up to ``stage``."""
     parameters = step.state.parameters
-    scene = parameters.scene()
+    scene = step.state.scene()
     low = rounded(scene, step.state.per_pixel)
     shapes = np.repeat(np.arange(len(scene)), scene.point_counts())
     index = np.arange(len(scene.points)) - scene.first[shapes]

@@ -47,6 +47,8 @@ class FitState:
     """Whether coordinates are being rounded and held, in stages."""
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: none so far."""
+    known: tuple[int, Scene] | None = None
+    """The last scene that was read back, and its step: all that is left when the device fails."""
     renewed: int = 0
     """How often a shape was reset because of a number that was not finite (``fit.densification``)."""
 
@@ -72,7 +74,10 @@ class FitState:
 
     def scene(self) -> Scene:
         """Return the current scene, on the host."""
-        return self.parameters.scene()
+        scene = self.parameters.scene()
+        if not self.known or self.known[0] != self.step:  # then there may be new shapes, not trained yet
+            self.known = self.step, scene
+        return scene
 
     def past(self) -> Past:
         """Return the optimizer state of the current scene, on the host."""

@@ -22,6 +22,10 @@ MESSAGE_INTERVAL = 1.0
 """Seconds between two such messages."""
 
 
+class BuildError(Exception):
+    """A module that cannot be compiled, or loaded then, in the words of the compiler or loader."""
+
+
 class _Compiler:
     """One thread for all modules of a process.
 
@@ -74,10 +78,14 @@ def _announce() -> None:
 
 
 def compile_by(work: Callable[[], None]) -> None:
-    """Do ``work`` in the compiler's thread, so that Ctrl-C need not wait for it; log how long it takes."""
+    """Do ``work`` in the compiler's thread, so that Ctrl-C need not wait for it; log how long it takes.
+
+    Raises:
+        BuildError: it failed, and native code said why.
+    """
     _announce()
     compiler = _compiler()
-    with messages_hidden():
+    with messages_hidden() as said:
         started = time.monotonic()
         future = compiler.ask(work)
         while not wait([future], MESSAGE_INTERVAL).done:
@@ -85,7 +93,16 @@ def compile_by(work: Callable[[], None]) -> None:
             log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
         compiler.seconds += time.monotonic() - started
     log.info("", extra={PASSING: True})
+    error, cause = future.exception(), first_error(said)
+    if cause and isinstance(error, Exception) and not isinstance(error, (OSError, MemoryError)):
+        raise BuildError(cause) from error
     future.result()
+
+
+def first_error(lines: list[str]) -> str:
+    """Return the first error among messages of native code; empty: there is none."""
+    found = [line.strip() for line in lines if "error" in line]
+    return next((line for line in found if "error:" in line), found[0] if found else "")
 
 
 def compiling() -> bool:

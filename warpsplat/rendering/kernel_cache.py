@@ -19,21 +19,26 @@ import tempfile
 import threading
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import warp as wp
 
-from warpsplat.errors import ResourceError, explain
+from warpsplat.errors import DeviceError, ResourceError, cause_of, explain
 from warpsplat.native import messages_hidden
 from warpsplat.rendering.compiler import compile_by
+from warpsplat.rendering.cuda import OUT_OF_MEMORY, called, cuda_error
 
 log = logging.getLogger(__name__)
 
 CHECKSUMS = "warpsplat.sha256.json"
 """File name -> SHA-256, beside the files of a module."""
 
-LOADED = (".o", ".meta", ".cubin", ".ptx")
+BINARIES = (".o", ".cubin", ".ptx")
+"""Suffixes of compiled modules."""
+
+LOADED = (*BINARIES, ".meta")
 """Suffixes of the files that Warp loads."""
 
 _temporary: list[str] = []
@@ -44,6 +49,7 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
     """Load a kernel's module, compiled if necessary. What is damaged in the cache is compiled again.
 
     Raises:
+        DeviceError: it cannot be compiled for the device, or loaded.
         ResourceError: neither the cache nor a temporary folder can hold compiled kernels.
     """
     module = kernel.module
@@ -59,36 +65,71 @@ _loading = threading.RLock()
 
 
 def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
-    """Load a module unless it is loaded."""
-    if (None if device.is_cpu else device.context, block_dim) in module.execs:
-        return
-    failure: BaseException | None = None
-    for attempt in range(3):
-        folder = _place() / module.get_module_identifier(block_dim)
-        if (failure or damaged(folder)) and not _discard(folder) and not failure:
-            failure = OSError(errno.EROFS, "holds damaged files and cannot be written")
-        if attempt == 2 or isinstance(failure, OSError):
-            use_temporary_folder(failure)
-            folder = _place() / folder.name
+    """Load a module unless it is loaded; again if files may be damaged, or another folder may hold them."""
+    while (None if device.is_cpu else device.context, block_dim) not in module.execs:
+        files = _Files.of(module, device, block_dim)
+        if damaged(files.folder) and not _discard(files.folder) and not _temporary:
+            use_temporary_folder(OSError(errno.EROFS, "holds damaged files and cannot be written"))
+            continue
+        cached = files.exist()
         try:
-            if not folder.exists():
-                with alone_with(folder):
-                    if not folder.exists():
+            if not cached:
+                with alone_with(files.folder):
+                    if not files.exist():
                         compile_by(lambda: wp.load_module(module, device, block_dim=block_dim))
             with messages_hidden():
                 wp.load_module(module, device, block_dim=block_dim)
         except Exception as error:  # Warp and its compiler raise exceptions of many types
+            module.mark_modified()  # or Warp would remember the failure
             if explain(error)[0].startswith("not enough memory"):
                 raise
-            failure = error
-            module.mark_modified()  # or Warp would remember the failure
-            continue
-        _record(folder)
-        return
-    raise ResourceError(
-        f"kernel cache {wp.config.kernel_cache_dir}: kernels cannot be compiled or loaded: "
-        f"{_cause(failure)}; set WARP_CACHE_PATH to another folder"
-    ) from failure
+            lacking = device.is_cuda and cuda_error()[0] == OUT_OF_MEMORY
+            suspect = cached and not lacking and not files.are_known()
+            if suspect and _discard(files.folder):
+                continue
+            if _temporary or not (suspect or isinstance(error, OSError)):
+                raise _failure(error, device, compiled=files.exist()) from error
+            use_temporary_folder(error)
+        else:
+            _record(files.folder)
+
+
+@dataclass(frozen=True)
+class _Files:
+    """The files of a module that a device loads."""
+
+    folder: Path
+    binary: Path
+    meta: Path
+
+    @staticmethod
+    def of(module: wp.Module, device: wp.Device, block_dim: Any) -> _Files:
+        """Return the files by Warp's names, which tell apart architectures of GPUs, and processors."""
+        folder = _place() / module.get_module_identifier(block_dim)
+        binary = module._get_compile_output_name(device, block_dim=block_dim)
+        return _Files(folder, folder / binary, folder / module._get_meta_name(block_dim=block_dim))
+
+    def exist(self) -> bool:
+        """Return whether there is nothing to compile."""
+        return self.binary.exists() and self.meta.exists()
+
+    def are_known(self) -> bool:
+        """Return whether an earlier run could load them, as long as they are not ``damaged``."""
+        with contextlib.suppress(OSError, ValueError):
+            return self.binary.name in json.loads((self.folder / CHECKSUMS).read_bytes())
+        return False
+
+
+def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exception:
+    """Return what to raise where a module cannot be compiled or loaded."""
+    if isinstance(error, OSError):
+        folder = wp.config.kernel_cache_dir
+        return ResourceError(f"kernel cache {folder}: {_cause(error)}; set WARP_CACHE_PATH to another folder")
+    reinstall = "pip install --force-reinstall warp-lang may help"
+    hint = "--device cpu does without" if device.is_cuda else reinstall
+    cause = (compiled and device.is_cuda and cuda_error()[1]) or cause_of(error)
+    done = "loaded on" if compiled else "compiled for"
+    return DeviceError(f"kernels cannot be {done} {called(device)}: {cause}; {hint}")
 
 
 LOCK = "warpsplat.lock"

@@ -38,7 +38,7 @@ def check_memory(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
     wanted = (DRAWN_BYTES + FINISHED_BYTES * (count - 1)) * viewport.pixel_count
     if wanted <= UNCHECKED:
         return
-    there = machine_memory() if device.is_cpu else device.total_memory
+    there = machine_memory() if device.is_cpu else device.free_memory
     limit = None if there is None else round(SHARE * there)
     if limit is not None and wanted > limit:
         several = f"{count} pictures" if count > 1 else "a picture"

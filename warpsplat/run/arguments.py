@@ -74,7 +74,7 @@ def custom_loss(options: Mapping[str, Any]) -> tuple[CustomLoss | None, dict[str
 def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backend]]:
     """Yield a function that starts the device, which is then held, and returns its backend.
 
-    Raises ``UsageError`` at once for an unknown device.
+    Raises ``UsageError`` or ``DeviceError`` at once for a device that is unknown or cannot be used.
     """
     check_threads(threads)
     with ExitStack() as held:
@@ -84,10 +84,12 @@ def backend_on(device: str, threads: int | None) -> Iterator[Callable[[], Backen
             from warpsplat.rendering.backend import Backend
             from warpsplat.rendering.device import choose_device, start_warp
             from warpsplat.rendering.device_lock import device_lock
+            from warpsplat.rendering.failures import failures_of
 
             start_warp()
             backend = Backend.on(choose_device(device), threads)
             held.enter_context(device_lock(backend.device))
+            held.enter_context(failures_of(backend.device))
             return backend
 
         if device not in ALWAYS_THERE:

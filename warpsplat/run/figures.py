@@ -89,7 +89,7 @@ def render_score(
 ) -> tuple[float, float | None]:
     """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
     small = not reduction and target[..., 0].size <= settings.fine_pixels
-    if renderer_of(settings.renderer).soft and small:
+    if renderer_of(settings.renderer).soft and small and not run.failures:
         return render_figures(made.scene, target, settings, run.backend)
     return made.render_psnr, None
 

@@ -10,6 +10,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from PIL import Image
@@ -28,6 +29,9 @@ from warpsplat.scene import FloatArray, Kind
 from warpsplat.scene.geometry import enlarged
 from warpsplat.svg.viewer import WHOLE_PIXELS
 from warpsplat.svg.write import resized
+
+if TYPE_CHECKING:
+    import warp as wp
 
 PROGRAM = 280 << 20
 """Bytes of Python, the libraries and compiled kernels."""
@@ -54,6 +58,15 @@ SHAPE = 24 << 10
 
 TRACED = {"drawing": 420, "line": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
+
+LANES = 1 << 10
+"""Bytes per slot that a GPU adds, twice with gradients: those of colours, by lane."""
+
+TRACED_ON_GPU = 160
+"""Bytes per pixel of the renders of a drawing, on a GPU."""
+
+ON_GPU = 32 << 20
+"""Bytes that a run takes on a GPU however small its image is: for sorting, and a surplus of shapes."""
 
 MASK_READ, MASK = 12, 4
 """Bytes per pixel of a mask: while it is read, and afterwards."""
@@ -97,6 +110,13 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
     return round(PROGRAM + 4 * facts.channels * worked + max(reading, working, scoring))
 
 
+def need_on_gpu(facts: ImageFacts, settings: Settings, factor: int = 1) -> int:
+    """Estimate the peak of a run on a GPU [bytes] from above."""
+    traced = TRACED_ON_GPU * facts.width * facts.height / factor**2
+    working = traced if settings.subject in TRACED else _fitting(facts, settings, factor, LANES)
+    return round(ON_GPU + working)
+
+
 def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
     """Return how many times smaller the mask of an image that is reduced ``factor`` times is read.
 
@@ -108,15 +128,18 @@ def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
     return found
 
 
-def _fitting(facts: ImageFacts, settings: Settings, factor: int) -> float:
-    """Return the bytes of the finest phase, which is the largest; the surplus of shapes is gone by then."""
+def _fitting(facts: ImageFacts, settings: Settings, factor: int, lanes: int = 0) -> float:
+    """Return the bytes of the finest phase, which is the largest; the surplus of shapes is gone by then.
+
+    ``lanes``: bytes per slot that the device's division of tiles adds.
+    """
     phase = phases(settings, -(-facts.width // factor), -(-facts.height // factor))[-1]
     pixels, curves = phase.width * phase.height, settings.curves
     tiles = pixels / 256
     slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * math.sqrt(tiles * curves) + SLOTS_A_SHAPE * curves
-    slot = SLOT
+    slot = SLOT + lanes
     slot += SLOT_STROKE if settings.kind == Kind.STROKE or settings.mixed else 0
-    slot += SLOT_PAINT if settings.paint != "flat" else 0
+    slot += SLOT_PAINT + lanes if settings.paint != "flat" else 0
     levels = len(settings.levels) or 1
     return levels * 1.5 * slots * slot + TRAINED * pixels + SHAPE * curves
 
@@ -171,24 +194,71 @@ class Sharing:
     processes = 1
 
 
+@dataclass(frozen=True)
+class DeviceMemory:
+    """Memory of a GPU that a run may take."""
+
+    name: str
+    limit: int
+
+    @staticmethod
+    def of(device: wp.Device) -> DeviceMemory | None:
+        """Return what is free now; None for a CPU, whose memory is the machine's."""
+        if device.is_cpu:
+            return None
+        import warp as wp
+
+        wp.synchronize_device(device)  # or what earlier runs freed would not count
+        return DeviceMemory(str(device), round(SHARE * device.free_memory / Sharing.processes))
+
+
+class Lack(NamedTuple):
+    """Memory that is short."""
+
+    wanted: int
+    """Bytes that a run takes."""
+    limit: str
+    """The limit below that, for people."""
+    remedy: str = ""
+
+
+def _lack(
+    facts: ImageFacts, settings: Settings, factor: int, mask: ImageFacts | None, gpu: DeviceMemory | None
+) -> Lack | None:
+    """Return the memory that is short for a run; None if there is enough."""
+    limit, wanted = memory_limit(settings), need(facts, settings, factor, mask)
+    if limit is not None and wanted > limit:
+        return Lack(wanted, limit_words(settings, limit))
+    if gpu and (wanted := need_on_gpu(facts, settings, factor)) > gpu.limit:
+        free = f"free memory of {gpu.name} for it is {in_words(gpu.limit)}"
+        return Lack(wanted, free, "; fewer --curves take less, --device cpu none of it")
+    return None
+
+
 def limit_words(settings: Settings, limit: int) -> str:
     """Return the limit of memory, for messages."""
     return f"{'max-memory is' if settings.max_memory else 'memory for it is'} {in_words(limit)}"
 
 
 def factor_for(
-    facts: ImageFacts | None, settings: Settings, name: str, mask: ImageFacts | None = None, least: int = 1
+    facts: ImageFacts | None,
+    settings: Settings,
+    name: str,
+    mask: ImageFacts | None = None,
+    least: int = 1,
+    gpu: DeviceMemory | None = None,
 ) -> int:
     """Return how many times an image has to be reduced: a power of two, at least ``least``; see ``need``.
 
     Raises ``ResourceError``, which begins with ``name``, if the limit is too small for any size.
     """
-    limit, factor = memory_limit(settings), least
-    while facts and limit is not None and (wanted := need(facts, settings, factor, mask)) > limit:
+    factor = least
+    while facts and (lack := _lack(facts, settings, factor, mask, gpu)):
         factor *= 2
         if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
-            needed = f"at least {in_words(wanted)} are needed"
-            raise ResourceError(f"{name}: {needed}, {limit_words(settings, limit)}")
+            raise ResourceError(
+                f"{name}: at least {in_words(lack.wanted)} are needed, {lack.limit}{lack.remedy}"
+            )
     return factor
 
 
@@ -199,16 +269,20 @@ def need_refined(facts: ImageFacts, settings: Settings) -> int:
     return max(need(facts, settings) + REFINED * pixels, cleared)
 
 
-def check_refined(source: ImageSource, settings: Settings, name: str) -> None:
+def check_refined(
+    source: ImageSource, settings: Settings, name: str, gpu: DeviceMemory | None = None
+) -> None:
     """Raise ``ResourceError`` if there is no memory to refine an SVG against an image at full size."""
     facts, limit = facts_of(source), memory_limit(settings)
-    if facts is None or limit is None:
+    if facts is None:
         return
     wanted = need_refined(facts, settings)
-    if wanted > limit:
+    words = limit_words(settings, limit) if limit is not None and wanted > limit else ""
+    if not words and gpu and (lack := _lack(facts, settings, 1, None, gpu)):
+        wanted, words = lack.wanted, lack.limit
+    if words:
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
-        hint = "refine against a smaller image"
-        raise ResourceError(f"{name}: {size}, {limit_words(settings, limit)}; {hint}")
+        raise ResourceError(f"{name}: {size}, {words}; refine against a smaller image")
 
 
 @dataclass(frozen=True)
@@ -258,15 +332,16 @@ def reduction_for(
     target: FloatArray,
     settings: Settings,
     factor: int,
+    gpu: DeviceMemory | None = None,
 ) -> Reduction | None:
     """Return the reduction of ``source`` to ``target``; None if that has the image's own size."""
-    limit = memory_limit(settings)
-    if facts is None or factor == 1 or limit is None:
+    lack = _lack(facts, settings, 1, mask, gpu) if facts and factor > 1 else None
+    if facts is None or lack is None:
         return None
-    whole = None
-    if isinstance(source, bytes) and not facts.deep and whole_score(facts, settings, factor) <= limit:
+    whole, limit = None, memory_limit(settings)
+    has_room = limit is None or whole_score(facts, settings, factor) <= limit
+    if isinstance(source, bytes) and not facts.deep and has_room:
         paper = solid_color(settings.background)
         whole = functools.partial(load_rows, source, paper, target.shape[2])
-    takes = in_words(need(facts, settings, mask=mask))
-    why = f"{facts.width}x{facts.height} pixels take about {takes}, {limit_words(settings, limit)}"
+    why = f"{facts.width}x{facts.height} pixels take about {in_words(lack.wanted)}, {lack.limit}"
     return Reduction(factor, facts.width, facts.height, whole, why)

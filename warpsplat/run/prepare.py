@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +17,13 @@ from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import Settings, make_settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.portable.filters import boxed
-from warpsplat.run.memory import Reduction, factor_for, facts_of, mask_factor, reduction_for
+from warpsplat.run.memory import DeviceMemory, Reduction, factor_for, facts_of, mask_factor, reduction_for
 from warpsplat.run.result import job_key
+from warpsplat.run.strategies import choose_strategy
 from warpsplat.scene import FloatArray, Kind, Scene
+
+if TYPE_CHECKING:
+    from warpsplat.rendering.backend import Backend
 
 
 @dataclass(frozen=True)
@@ -46,11 +52,13 @@ def prepare(
     importance: ImageSource | None = None,
     loss: CustomLoss | None = None,
     keyed: bool = False,
+    backend: Callable[[], Backend] | None = None,
 ) -> PreparedImage:
     """Read an image and its mask, at a size that memory allows, and find out what it shows.
 
     If ``keyed``, the file names the job that made it (``job_key``), by which batches recognise it: the
-    source and the mask are files then. Other arguments are those of ``vectorize``.
+    source and the mask are files then. ``backend`` starts the device, whose memory counts if it is a GPU's.
+    Other arguments are those of ``vectorize``.
 
     Raises:
         ImageError: the image or the mask cannot be read, or their proportions differ.
@@ -69,11 +77,14 @@ def prepare(
     first = factor_for(facts, settings, name, mask_facts)
     target = load_target(source, name, settings.background, first)
     chosen, why = choose_subject(target, settings)
-    factor = factor_for(facts, chosen, name, mask_facts, first)
+    gpu = None
+    if backend and choose_strategy(chosen).uses_device:
+        gpu = DeviceMemory.of(backend().device)
+    factor = factor_for(facts, chosen, name, mask_facts, first, gpu)
     if factor > first:
         target = boxed(target, factor // first)
     release_memory()
-    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor)
+    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
     if loss and chosen.subject != "photo":
         raise UsageError(f"subject {chosen.subject} and a loss of your own do not go together")
     prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, reduction, name)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import ImageError, naming
+from warpsplat.errors import DeviceError, ImageError, naming
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
@@ -23,15 +23,16 @@ from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
+from warpsplat.rendering.failures import failures_of
 from warpsplat.run.arguments import backend_on, check_keywords, custom_loss, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
 from warpsplat.run.formats import write_named
-from warpsplat.run.memory import check_refined
+from warpsplat.run.memory import DeviceMemory, check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
 from warpsplat.run.svg import SvgSource, svg_name_of, text_of
-from warpsplat.run.tracking import recorded, timed
+from warpsplat.run.tracking import failed, recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
@@ -98,11 +99,14 @@ def refine(
     problem = Problem(load_target(pixels, image_name, settings.background), settings, loss=loss)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
+        check_refined(pixels, settings, image_name, DeviceMemory.of(backend().device))
         saved = kept.open(identity("refine", settings, problem, text), backend()) if kept else None
         run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:
         write_named(Path(output), result.svg)
+    if run.failures:
+        raise failed(run, name, result)
     if kept and not result.stopped:
         kept.path.unlink(missing_ok=True)
     return result
@@ -126,12 +130,20 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     settings = _settings(problem.settings, len(scene))
     problem = replace(problem, target=target, settings=settings)
     made = fit(problem, run, Start(scene=scene))
+    judged = problem.loss or settings.loss != "l2"  # on the device
+    if run.failures and (judged or not made.iterations):
+        raise run.failures[0]
     if checkpoint and made.interrupted:
         checkpoint.save()
     release_memory()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
-        refined = clear_empty(refined, target, settings, run.backend, made.per_pixel)
+        try:
+            with failures_of(run.backend.device):
+                refined = clear_empty(refined, target, settings, run.backend, made.per_pixel)
+        except DeviceError as failure:
+            run.failures.append(failure)
+            made = replace(made, interrupted=True)
     svg = write_svg(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
@@ -139,7 +151,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     perceptual = has_time_for_ssimulacra2(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, perceptual=perceptual)
     better = score.psnr > before.psnr
-    if problem.loss or settings.loss != "l2":
+    if judged:
         after, start = (loss_of_file(each, refined, problem, run.backend) for each in (svg, text))
         better = after < start
     if perceptual and not better:

@@ -86,7 +86,7 @@ def vectorize_several(
     check_several(settings, curves)
     with backend_on(device, threads) as backend:
         most = replace(settings, curves=max(curves), simplify=False)
-        prepared = prepare(image, most, name=name, importance=importance)
+        prepared = prepare(image, most, name=name, importance=importance, backend=backend)
         subject = prepared.problem.settings.subject
         if subject in OWN_NUMBER:
             raise UsageError(

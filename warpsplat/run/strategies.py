@@ -23,6 +23,8 @@ class Strategy(NamedTuple):
     """Whether the order of its shapes is kept; else they are reordered to make the file small."""
     traces: bool = False
     """Whether it leaves transparent pixels empty."""
+    uses_device: bool = True
+    """Whether it takes memory of the device."""
 
     @property
     def make(self) -> Callable[[Problem, Run], Fit]:
@@ -45,9 +47,13 @@ STRATEGIES = {
     "layers": Strategy("warpsplat.fit.layered:fit_layered"),
     "goal": Strategy("warpsplat.search.goal:search_goal", keeps_order=True),
     "drawing": Strategy("warpsplat.drawing.draw:draw_regions", keeps_order=True, traces=True),
-    "draft": Strategy("warpsplat.drawing.draft:draft_regions", keeps_order=True, traces=True),
+    "draft": Strategy(
+        "warpsplat.drawing.draft:draft_regions", keeps_order=True, traces=True, uses_device=False
+    ),
     "line": Strategy("warpsplat.drawing.line_art:draw_lines", keeps_order=True, traces=True),
-    "pixel": Strategy("warpsplat.drawing.draft:draw_pixels", keeps_order=True, traces=True),
+    "pixel": Strategy(
+        "warpsplat.drawing.draft:draw_pixels", keeps_order=True, traces=True, uses_device=False
+    ),
 }
 
 

@@ -139,7 +139,7 @@ def suggest(
     check_suggesting(settings)
     with backend_on(device, threads) as backend:
         run = Run(backend, callback, stop)
-        prepared = prepare(image, settings, name=name, importance=importance)
+        prepared = prepare(image, settings, name=name, importance=importance, backend=backend)
         subject = prepared.problem.settings.subject
         if subject != "photo":
             seen = f" ({prepared.why})" if prepared.why else ""
@@ -149,6 +149,8 @@ def suggest(
             )
             return Suggestion(None, subject, why, (), None, None, time.monotonic() - run.started)
         worth = survey(prepared.problem, run)
+    if run.failures:
+        raise run.failures[0]
     if worth is None:
         return None
     made = suggestion(worth)

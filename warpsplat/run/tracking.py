@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from warpsplat.errors import DeviceError
 from warpsplat.fit.problem import Fit, Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
 from warpsplat.scene import FloatArray
+
+if TYPE_CHECKING:
+    from warpsplat.run.result import Result
 
 RELEASE_INTERVAL = 10
 """Progress reports from one release of free memory to the next: a release takes as long as a step does."""
@@ -52,3 +57,14 @@ def timed(run: Run, settings: Settings, target: FloatArray) -> Run:
         return run
     tail = TAIL_SECONDS + TAIL_PER_PIXEL * target[..., 0].size
     return run.derived(deadline=time.monotonic() + settings.time_budget - tail, checkpoint=None)
+
+
+def failed(run: Run, name: str, result: Result) -> DeviceError:
+    """Return the error of a run whose device failed, and that has made ``result`` of what was left."""
+    saved = run.checkpoint and not run.checkpoint.is_empty
+    resumed = "; --resume continues from the checkpoint" if saved else ""
+    left = f"has the shapes after {result.iterations} steps" if result.iterations else "is the trace alone"
+    text = f"{name}: {run.failures[0]}; its file {left}{resumed}"
+    error = DeviceError(text)
+    error.result, error.is_lost = result, run.failures[0].is_lost
+    return error

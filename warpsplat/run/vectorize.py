@@ -10,13 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from warpsplat.errors import UsageError, naming
+from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
-from warpsplat.fit.problem import Run
+from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
@@ -26,11 +24,11 @@ from warpsplat.run.figures import level_scores, missed_goals, render_score, scor
 from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
-from warpsplat.run.strategies import STRATEGIES, arranged, choose_strategy
-from warpsplat.run.tracking import recorded, report_end, timed
+from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
+from warpsplat.run.tracking import failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene
-from warpsplat.scene.geometry import areas
+from warpsplat.scene.geometry import most_seen
 from warpsplat.svg.page import placed
 
 if TYPE_CHECKING:
@@ -93,7 +91,8 @@ def vectorize(
         ImageError: an image or mask that cannot be read.
         CheckpointError: a checkpoint that cannot be read; one of another run is a ``UsageError``.
         OutputError: ``output`` cannot be written.
-        ResourceError: memory, threads, or a place for compiled kernels are missing.
+        ResourceError: memory, threads, or a place for compiled kernels are missing; or the device cannot be
+            used, or failed (``DeviceError``): the ``result`` of that error is what could be saved.
         TypeError: an image of none of these forms, or an unknown keyword.
     """
     if isinstance(curves, (list, tuple)):
@@ -106,7 +105,9 @@ def vectorize(
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
     write = None if output is None else functools.partial(write_named, Path(output))
     with backend_on(device, threads) as backend:
-        prepared = prepare(image, settings, name=name, importance=importance, loss=loss, keyed=keyed)
+        prepared = prepare(
+            image, settings, name=name, importance=importance, loss=loss, keyed=keyed, backend=backend
+        )
         saved = kept.open(identity("vectorize", settings, prepared.problem), backend()) if kept else None
         result = make_result(prepared, Run(backend, callback, stop, checkpoint=saved), write)
     if kept and not result.stopped:
@@ -124,6 +125,7 @@ def make_result(
 
     Raises:
         ImageError: a problem with the image that shows only during the work.
+        DeviceError: the device failed; what could be saved is written, and the error's ``result``.
     """
     begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
     problem, reduction = image.problem, image.reduction
@@ -132,15 +134,17 @@ def make_result(
     strategy = choose_strategy(settings) if start is None else STRATEGIES["fit"]
     with naming(image.name):
         if start is None:
-            made = strategy.make(problem, run)
+            made = _made(problem, strategy, run)
         else:
             from warpsplat.fit.loop import fit
 
             made = fit(problem, run, start)
+        if run.failures and not (made.iterations or strategy.traces):
+            raise run.failures[0]
         report_end(made, run, history)
         if checkpoint and made.interrupted:
             checkpoint.save()
-        made = arranged(made, problem, strategy, run)
+        made = _arranged(made, problem, strategy, run)
         if reduction:
             made, settings = reduction.enlarged(made), reduction.settings(settings)
         release_memory()
@@ -174,7 +178,38 @@ def make_result(
             history=tuple(history),
         )
     release_memory()
+    if run.failures:
+        raise failed(run, image.name, result)
     return result
+
+
+def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:
+    """Return what a strategy makes; of a drawing whose device fails, the trace alone, which needs none."""
+    if strategy is not STRATEGIES["drawing"]:
+        return strategy.make(problem, run)
+    from warpsplat.rendering.failures import failures_of
+
+    try:
+        with failures_of(run.backend.device):
+            return strategy.make(problem, run)
+    except DeviceError as failure:
+        made = STRATEGIES["draft"].make(problem, run)
+        run.failures.append(failure)
+        return replace(made, interrupted=True)
+
+
+def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
+    """Return ``arranged``, without what takes the device if that fails."""
+    if not strategy.uses_device:
+        return arranged(made, problem, strategy, run)
+    from warpsplat.rendering.failures import failures_of
+
+    try:
+        with failures_of(run.backend.device):
+            return arranged(made, problem, strategy, run)
+    except DeviceError as failure:
+        run.failures.append(failure)
+        return arranged(replace(made, interrupted=True), problem, strategy, run)
 
 
 def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
@@ -188,8 +223,7 @@ def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: 
     while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
         excess = 1 - settings.max_bytes / size
         count = min(max(1, round(excess * len(scene))), len(scene) - 1)
-        seen = areas(scene) * scene.opacities
-        scene = scene.take(np.sort(np.argsort(seen, kind="stable")[count:]))
+        scene = most_seen(scene, len(scene) - count)
         svg, size = made()
     return svg, scene
 

@@ -70,6 +70,13 @@ def areas(scene: Scene) -> FloatArray:
     return np.abs(result).astype(np.float32)
 
 
+def most_seen(scene: Scene, count: int, base: int = 0) -> Scene:
+    """Return the ``count`` shapes of a scene that show most, among them its first ``base`` ones."""
+    seen = areas(scene) * scene.opacities
+    seen[:base] = np.inf
+    return scene.take(np.sort(np.argsort(seen, kind="stable")[max(len(scene) - count, 0) :]))
+
+
 def bounds(scene: Scene) -> FloatArray:
     """Return the boxes (x0, y0, x1, y1) of the shapes [canvas units] with their strokes, shape (shape, 4)."""
     low = np.full((len(scene), 2), np.inf, np.float32)

@@ -333,6 +333,11 @@ class Scene:
             return ranges(self.stop_first[index], np.diff(self.stop_first)[index])
         return ranges(self.first[index], self.point_counts()[index])
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether all its values are finite."""
+        return all(np.isfinite(getattr(self, a.name)).all() for a in ATTRIBUTES)
+
     def take(self, index: IndexArray) -> Scene:
         """Return the shapes ``index``, in that order; one without its twin is no longer one."""
         index = np.asarray(index, np.intp)

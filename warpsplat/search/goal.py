@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from warpsplat.errors import DeviceError
 from warpsplat.fit.budget import affordable_curves
 from warpsplat.fit.loop import Rounding, fit
 from warpsplat.fit.place import simple_curves
@@ -16,6 +17,7 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
+from warpsplat.rendering.failures import failures_of
 from warpsplat.search.candidate import FEW_SHAPES, LAST_STEPS, Candidate, Change, changed, for_few, measured
 from warpsplat.svg.write import GRIDS
 
@@ -89,7 +91,12 @@ def search_goal(problem: Problem, run: Run) -> Fit:
         change = next_change(tried, settings)
         if change is None or run.over():
             break
-        made = changed(problem, change, next(parts))
+        try:
+            with failures_of(run.backend.device):
+                made = changed(problem, change, next(parts))
+        except DeviceError as failure:
+            run.failures.append(failure)
+            break
         done += made.iterations
         if made.interrupted:
             break

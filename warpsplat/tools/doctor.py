@@ -139,17 +139,19 @@ def check_extras() -> Check:
 
 
 def check_devices() -> Check:
-    """Check the devices that Warp finds."""
+    """Check the devices that Warp finds, and what stands in the way of others."""
     import warp as wp
 
-    from warpsplat.rendering.device import choose_device, start_warp
+    from warpsplat.rendering.device import choose_device, no_gpu, obstacle, start_warp
 
     start_warp()
-    driver = wp.get_cuda_driver_version()
+    driver, gpus = wp.get_cuda_driver_version(), wp.get_cuda_devices()
     devices: list[dict[str, Any]] = [
         {"name": str(d), "description": d.name, "memory": None if d.is_cpu else d.total_memory}
         for d in wp.get_devices()
     ]
+    reasons = {str(gpu): obstacle(gpu) for gpu in gpus} if gpus else {"no GPU": no_gpu()}
+    obstacles = {name: why for name, why in reasons.items() if why}
     values = {
         "devices": devices,
         "default_device": str(choose_device("auto")),
@@ -160,10 +162,9 @@ def check_devices() -> Check:
         for d in devices
     ]
     text = ", ".join(shown) + f"; default: {values['default_device']}"
-    if driver and len(devices) == 1:
-        hint = "Warp finds no GPU: nvidia-smi should list it, CUDA_VISIBLE_DEVICES may hide it"
-        return Check(f"{text}; a CUDA driver ({values['cuda_driver']}), no GPU", values, "note", hint)
-    return Check(text, values)
+    text += "".join(f"; {name}: {why.cause}" for name, why in obstacles.items())
+    hint = "; ".join(dict.fromkeys(why.remedy for why in obstacles.values() if why.remedy))
+    return Check(text, values, "note" if hint else "ok", hint)
 
 
 def check_machine() -> Check:
@@ -212,6 +213,13 @@ def _size(folder: Path) -> int:
     return size
 
 
+def _binaries(folder: Path) -> set[Path]:
+    """Return the compiled modules, of which each kind of device has its own."""
+    from warpsplat.rendering.kernel_cache import BINARIES
+
+    return {path for path in folder.glob("wp_*/*") if path.suffix in BINARIES}
+
+
 def check_viewer() -> Check:
     """Check resvg, which renders files for measurement."""
     from warpsplat.svg.viewer import render_svg
@@ -238,12 +246,12 @@ def check_run(device: str) -> Check:
     y, x = np.mgrid[:48, :48] / np.float32(48)
     image = np.stack([x, y, 0.5 + 0.4 * np.sin(6 * x) * np.cos(5 * y)], axis=2).astype(np.float32)
     folder = Path(str(wp.config.kernel_cache_dir))
-    before = set(folder.glob("wp_*"))
+    before = _binaries(folder)
     started = time.monotonic()
     result = vectorize(image, 16, subject="photo", iterations=60, seed=0, device=device)
     seconds = time.monotonic() - started
     assert result.score
-    psnr, compiled = result.score.psnr, len(set(folder.glob("wp_*")) - before)
+    psnr, compiled = result.score.psnr, len(_binaries(folder) - before)
     values = {"psnr": round(psnr, 2), "seconds": round(seconds, 2), "compiled": compiled}
     text = f"16 shapes in 60 steps: {psnr:.1f} dB in {seconds:.1f} s"
     text += f", {compiled} modules compiled" if compiled else ", kernels were compiled before"

@@ -123,6 +123,8 @@ class Pool(WorkerExecutor[WorkerProcess]):
                 worker.responded = True
             if isinstance(message, Outcome):
                 worker.task = None
+                if message.spent:
+                    self._remove([worker])
                 yield message
             elif isinstance(message, logging.LogRecord):
                 logging.getLogger(message.name).handle(message)

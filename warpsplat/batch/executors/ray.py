@@ -162,6 +162,8 @@ class RayCluster(WorkerExecutor[RayWorker]):
         if worker.task:
             worker.task = None
             outcome: Outcome = answer
+            if outcome.spent:
+                self._remove([worker])
             return outcome
         version, worker.node = answer
         if version != __version__:

@@ -58,7 +58,9 @@ class Outcome:
     figures: dict[str, Any] = field(default_factory=dict)
     """See ``Result.as_dict``; for a task with a ``result``, those that can be measured."""
     error: str = ""
-    """Why the task failed, in one line that names the image."""
+    """Why the task failed, in one line that names the image; with ``data`` if that could be saved."""
+    spent: bool = False
+    """Whether the process cannot use its device any more."""
     report: str = field(default="", repr=False)
     """The page, if it was requested and could be made."""
     report_error: str = ""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from warpsplat.batch.executors.tasks import OnProgress, Outcome, Stop, Task
-from warpsplat.errors import WarpsplatError, explain, printable
+from warpsplat.errors import DeviceError, WarpsplatError, explain, printable
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress
 from warpsplat.metrics import score_svg
@@ -42,7 +42,10 @@ def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:  # a panic of Rust code derives from no Exception
-        return Outcome(task.number, "failed", key=task.key, error=failure(error, task.name, task.output))
+        words, saved = failure(error, task.name, task.output), getattr(error, "result", None)
+        data = named_bytes(Path(task.output), saved.svg, key=STOPPED) if saved else None
+        spent = isinstance(error, DeviceError) and error.is_lost
+        return Outcome(task.number, "failed", key=task.key, data=data, error=words, spent=spent)
 
 
 def failure(error: BaseException, *names: str) -> str:
@@ -63,7 +66,9 @@ def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
         mask = io.BytesIO(task.mask)
         mask.name = task.mask_name
     with backend_on(task.device, task.threads) as backend:
-        prepared = prepare(task.image, task.settings, name=task.name, importance=mask, keyed=True)
+        prepared = prepare(
+            task.image, task.settings, name=task.name, importance=mask, keyed=True, backend=backend
+        )
         result = make_result(prepared, Run(backend, advance, stop))
         data = named_bytes(Path(task.output), result.svg, key=STOPPED if result.stopped else task.key)
         status: Literal["stopped", "made"] = "stopped" if result.stopped else "made"
