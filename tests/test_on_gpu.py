@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from tests import needs, roofline
+from tests import ROOT, fake_cuda, needs, roofline
 from tests.on_gpu import __main__ as on_gpu
 from tests.on_gpu.parts import PARTS, Plan
 from tests.tracing.trace import Count, Memory
@@ -37,6 +38,7 @@ def test_parts_pass_on_the_cpu(folder: Path, capsys: pytest.CaptureFixture[str])
     status = on_gpu.main(arguments)
     text = capsys.readouterr().out
     assert status == 0, text
+    assert text.count("PASS") == len(QUICK)
     table = text[text.index("| part |") :]
     assert {line.split("|")[1].strip() for line in table.splitlines()[2:] if line.startswith("|")} == {*QUICK}
     assert "0 of " in table.splitlines()[-1]
@@ -48,7 +50,23 @@ def test_what_fails_does_not_end_the_others(folder: Path, capsys: pytest.Capture
     assert on_gpu.main(["--device", "cuda:99", "--small", "--only", "bits", "kernels"]) == 1
     text = capsys.readouterr().out
     assert text.count("FAILED") == 2
+    assert "kernels: FAIL: 1 of 1" in text
+    assert "bits: FAIL: 1 of 1" in text
     assert "cuda:99" in text
+
+
+@pytest.mark.slow
+def test_the_day_with_a_gpu_is_rehearsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the test device, with a PyTorch that knows nothing of it: what needs that is left out, no more."""
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")
+    arguments = ["--small", "--pictures", str(folder), "--count", "1"]
+    done = fake_cuda.run("-m", "tests.on_gpu", *arguments, "--only", *QUICK, "speed", "torch", cwd=ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+    ends = re.findall(r"s  (\w+): (PASS|FAIL|LEFT OUT)", done.stdout)
+    left_out = {"streams", "torch"}
+    wanted = {name: "LEFT OUT" if name in left_out else "PASS" for name in (*QUICK, "speed", "torch")}
+    assert dict(ends) == wanted
+    assert "forward and backward, closed, 16, 64x64: " in done.stdout
 
 
 def test_a_part_that_takes_too_long_is_ended() -> None:

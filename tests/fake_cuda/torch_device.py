@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,6 +18,7 @@ from torch.overrides import TorchFunctionMode
 
 from tests.fake_cuda.install import driver
 from tests.fake_cuda.memory import Block
+from tests.fake_cuda.streams import Event
 
 DEVICE = torch.device("cuda", 0)
 
@@ -27,20 +27,44 @@ PROPERTIES = {torch.Tensor.device.__get__: DEVICE, torch.Tensor.is_cuda.__get__:
 MOVES = {torch.Tensor.cuda, torch.Tensor.cpu}
 
 
-class OnDevice(TorchFunctionMode):
-    """Functions of PyTorch as if tensors were on the device, in the order of its stream ``handle``."""
+class TorchStream:
+    """A stream as PyTorch has them; without a handle one of its side streams, which do not block."""
 
-    def __init__(self, handle: int) -> None:
+    device = DEVICE
+
+    def __init__(self, handle: int | None = None) -> None:
+        found = driver().machine.new_stream(0, blocking=False).handle if handle is None else handle
+        self.cuda_stream = found
+
+    def wait_stream(self, other: TorchStream) -> None:
+        """Have later work here wait for the work of another stream so far."""
+        source = driver().stream(other.cuda_stream)
+        driver().machine.let_wait(driver().stream(self.cuda_stream), Event(source, driver().machine.now()))
+
+
+class OnDevice(TorchFunctionMode):
+    """Functions of PyTorch as if tensors were on the device, in the order of a stream."""
+
+    def __init__(self, stream: TorchStream) -> None:
         super().__init__()
-        self.handle = handle
+        self.stream = stream
         self.kept: list[object] = []
+
+    @contextlib.contextmanager
+    def on(self, stream: TorchStream) -> Iterator[None]:
+        """Work on another stream meanwhile: ``torch.cuda.stream``."""
+        before, self.stream = self.stream, stream
+        try:
+            yield
+        finally:
+            self.stream = before
 
     def __torch_function__(self, function: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         if function in PROPERTIES:
             return PROPERTIES[function]
         if function is torch.device:
             return function(*args, **(kwargs or {}))
-        driver().wp_cuda_stream_synchronize(self.handle)
+        driver().wp_cuda_stream_synchronize(self.stream.cuda_stream)
         if function in MOVES:
             return args[0]
         args = [each for each in args if not isinstance(each, torch.device)]
@@ -75,18 +99,19 @@ def to_torch(array: wp.array) -> torch.Tensor:
 @contextlib.contextmanager
 def tensors_on_device(side_stream: bool = False) -> Iterator[None]:
     """Have tensors on the device meanwhile; on a stream that does not block, or the legacy default stream."""
-    handle = driver().machine.new_stream(0, blocking=False).handle if side_stream else 0
     run_backward = torch.autograd._engine_run_backward  # type: ignore[attr-defined]
 
     def run_with_mode(*arguments: Any, **named: Any) -> Any:
         with mode:  # which is off while one of PyTorch's functions runs
             return run_backward(*arguments, **named)
 
-    stream = SimpleNamespace(device=DEVICE, cuda_stream=handle, wait_stream=lambda other: None)
-    with pytest.MonkeyPatch.context() as patch, OnDevice(handle) as mode:
+    with pytest.MonkeyPatch.context() as patch, OnDevice(TorchStream(None if side_stream else 0)) as mode:
         patch.setattr(torch.cuda, "is_available", lambda: True)
         patch.setattr(torch.cuda, "device_count", lambda: 1)
-        patch.setattr(torch.cuda, "current_stream", lambda device=None: stream)
+        patch.setattr(torch.cuda, "current_stream", lambda device=None: mode.stream)
+        patch.setattr(torch.cuda, "stream", mode.on)
+        patch.setattr(torch.cuda, "Stream", TorchStream)
+        patch.setattr(wp, "stream_to_torch", lambda stream: TorchStream(stream.cuda_stream))
         patch.setattr(torch.cuda, "is_current_stream_capturing", lambda: False)
         patch.setattr(torch.autograd, "_engine_run_backward", run_with_mode)
         patch.setattr(wp, "to_torch", to_torch)

@@ -17,9 +17,11 @@ import torch
 
 import warpsplat.torch
 from tests.lanes import divide_as_on_gpu
-from tests.scenes import mixed_scene
+from tests.scenes import mixed_scene, random_scene
 from warpsplat import pydiffvg
 from warpsplat.rendering.device import start_warp
+from warpsplat.scene import Kind
+from warpsplat.torch import engine
 from warpsplat.torch.engine import clear_cache
 
 Tensors = dict[str, torch.Tensor]
@@ -43,19 +45,47 @@ def steps_of_torch() -> Tensors:
     return {"image": image, **grads}
 
 
-def circle_of_pydiffvg() -> Tensors:
+def circle_of_pydiffvg(output: pydiffvg.OutputType = pydiffvg.OutputType.color) -> Tensors:
     """Render a circle and differentiate by its radius."""
     radius = torch.tensor(9.0, requires_grad=True, device=pydiffvg.get_device())
     circle = pydiffvg.Circle(radius=radius, center=torch.tensor([20.0, 14.0]))
     group = pydiffvg.ShapeGroup(shape_ids=torch.tensor([0]), fill_color=torch.tensor([0.2, 0.6, 0.3, 0.8]))
-    arguments = pydiffvg.RenderFunction.serialize_scene(48, 32, [circle], [group])
+    arguments = pydiffvg.RenderFunction.serialize_scene(48, 32, [circle], [group], output_type=output)
     image = pydiffvg.RenderFunction.apply(48, 32, 2, 2, 0, None, *arguments)
     image.square().sum().backward()
     assert radius.grad is not None
     return {"image": image, "radius": radius.grad}
 
 
-PROGRAMS: tuple[Callable[[], Tensors], ...] = (steps_of_torch, circle_of_pydiffvg)
+def distances_of_pydiffvg() -> Tensors:
+    """Measure distances from the circle."""
+    return circle_of_pydiffvg(pydiffvg.OutputType.sdf)
+
+
+def renderers_that_leave() -> Tensors:
+    """Render on two streams, so that renderers leave the cache while they are at work on the other one."""
+    found, kept, engine.KEPT = {}, engine.KEPT, 1
+    streams = [None, None] if pydiffvg.get_device().type == "cpu" else [torch.cuda.Stream() for _ in range(2)]
+    scenes = [
+        warpsplat.torch.SceneTensors.of(random_scene(Kind.FILL, 3 + i), pydiffvg.get_device())
+        for i in range(4)
+    ]
+    for i, scene in enumerate(scenes):
+        with torch.cuda.stream(streams[i % 2]):
+            found[str(i)] = warpsplat.torch.render(scene)
+    for i, image in enumerate(found.values()):
+        with torch.cuda.stream(streams[i % 2]):
+            found[str(i)] = image.clone()
+    engine.KEPT = kept
+    return found
+
+
+PROGRAMS: tuple[Callable[[], Tensors], ...] = (
+    steps_of_torch,
+    circle_of_pydiffvg,
+    distances_of_pydiffvg,
+    renderers_that_leave,
+)
 
 
 def main() -> None:

@@ -40,9 +40,9 @@ def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | Non
     scenes = []
     for graph in (True, False):
         step = step_for(scene, target, device, settings, threads=1)
-        assert step._graph is not None
+        assert step.replay.graph is not None
         if not graph:
-            step._graph = None
+            step.replay.graph = None
         for _ in range(7):
             step.advance()
         scenes.append(step.state.scene())
@@ -74,7 +74,7 @@ def test_every_kernel_is_in_a_captured_step(
         divide_as_on_gpu(monkeypatch)
     launched = set()
     for step in steps_of_all_kinds(device):
-        assert step._graph is not None
+        assert step.replay.graph is not None
         launched |= {launch.name for program in step.programs for launch in program.launches}
     backend = Backend.on(device)
     every = {kernel.key for kernel in all_kernels(backend.column)}
@@ -123,9 +123,9 @@ def test_evaluating_a_file_that_outgrows_the_arrays(device: str, renderer: str) 
     settings = make_settings(curves=20, iterations=100, renderer=renderer)
     scene = new_scene(settings, picture())
     step = step_for(scene, picture(), device, settings, threads=1, capacity=Capacity(40, 9))
-    before = step._graph
+    before = step.replay.graph
     evaluate_file(step)
-    assert step._graph is not before
+    assert step.replay.graph is not before
     assert step.renderer.capacity.slots > 9
     shown = on_white(render_svg(export(step.state.scene(), settings, step.state.per_pixel)))
     step.advance()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import multiprocessing
 import os
 import statistics
@@ -25,13 +26,14 @@ from tests.fit.pictures import picture, step_for
 from tests.kernels.modules import all_kernels
 from tests.runs import scored, vectorize
 from tests.scenes import CURVES, forms_scene, mixed_scene, random_scene, styled_scene, with_gradients
+from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.kernel_cache import load
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import Cap, FloatArray, Join, Kind, Scene
-from warpsplat.tools.bench import bench, bench_scene, peak_memory
+from warpsplat.tools.bench import bench, bench_scene, check_torch, peak_memory, time_torch
 
 MEGA = 1e6
 
@@ -43,7 +45,8 @@ class Row:
     what: str
     figure: str
     wanted: str = ""
-    passed: bool = True
+    passed: bool | None = True
+    """None: left out, as something is missing here."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +57,15 @@ class Plan:
     pictures: tuple[str, ...]
     """Image files."""
     sizes: tuple[tuple[int, int, int], ...] = ((512, 768, 512), (2048, 2040, 1344))
-    """Shapes, width and height [px] that are timed; the last one has goals."""
+    """Shapes, width and height [px] that are timed."""
+    has_goals: bool = True
+    """Whether the last of them has goals."""
     curves: int = 512
     """Shapes for a picture."""
     iterations: int | None = None
     """Steps for a picture; default: the usual number."""
+    side: int | None = None
+    """Longest side that pictures are reduced to [px]; default: as they are."""
     repeats: int = 20
     suite: tuple[str, ...] = ("tests",)
     """Arguments of pytest."""
@@ -88,7 +95,7 @@ def kernels(plan: Plan) -> Iterator[Row]:
         for done in [pool.submit(compile_share, *share) for share in shares]:
             done.result()
     yield Row(f"kernels compiled by {workers} processes", f"{time.perf_counter() - begin:.1f} s")
-    captured = step_for(mixed_scene(64, 48), picture(), plan.device, threads=1)._graph is not None
+    captured = step_for(mixed_scene(64, 48), picture(), plan.device, threads=1).replay.graph is not None
     yield Row("a step is one graph", "yes" if captured else "no", "yes", captured)
 
 
@@ -106,11 +113,17 @@ def suite(plan: Plan) -> Iterator[Row]:
     yield Row("tests with a device", lines[-1].strip("= ") if lines else "none", "", done.returncode == 0)
 
 
-def passes(scene: Scene, device: str) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return a render and gradients for a random gradient of the image."""
+def renderer_for(scene: Scene, device: str) -> Renderer:
+    """Return a renderer of a scene at its own size, after a first pass."""
     viewport = Viewport(scene.canvas.width, scene.canvas.height)
     renderer = Renderer(Parameters(scene, Backend.on(device)), viewport)
     renderer.forward_complete()
+    return renderer
+
+
+def passes(scene: Scene, device: str) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return a render and gradients for a random gradient of the image."""
+    renderer = renderer_for(scene, device)
     image = renderer.read_image()
     renderer.write_image_grad(np.random.default_rng(0).normal(size=image.shape).astype(np.float32))
     renderer.backward()
@@ -166,28 +179,46 @@ GOALS = {"closed": 2.0, "open": 1.0}
 """Forward and backward pass of the largest scene [ms]."""
 
 
-def speed(plan: Plan) -> Iterator[Row]:
-    """Time steps, and passes through PyTorch."""
-    has_torch = find_spec("torch") is not None
-    backend = Backend.on(plan.device)
+def timed_scenes(plan: Plan) -> Iterator[tuple[str, str, Scene]]:
+    """Yield the scenes to time: their kind, name and shapes."""
     for count, width, height in plan.sizes:
-        for kind, goal in GOALS.items():
-            name = f"{kind}, {count}, {width}x{height}"
+        for kind in GOALS:
             scene = bench_scene(kind, count, (width, height), 0.9, 0)
-            times = bench(scene, "exact", backend, plan.repeats, 0, through_torch=has_torch)
-            yield Row(f"step, {name}", spread(times["step"]))
-            has_goal = plan.is_cuda and (count, width, height) == plan.sizes[-1]
-            good = not has_goal or times["forward_backward"]["median"] <= goal
-            wanted = f"at most {goal:g} ms" if has_goal else ""
-            yield Row(f"forward and backward, {name}", spread(times["forward_backward"]), wanted, good)
-            slowest = sorted(times["kernels"].items(), key=lambda pair: -pair[1]["median"])[:4]
-            yield Row(
-                f"slowest kernels, {name}", ", ".join(f"{key} {one['median']:.3f}" for key, one in slowest)
-            )
-            if has_torch:
-                ratio = times["through_torch"]["ratio"]
-                yield Row(f"through PyTorch, {name}", f"{ratio:.2f} times as long")
-    yield Row("PyTorch", "installed" if has_torch else "missing", "installed", has_torch)
+            yield kind, f"{kind}, {count}, {width}x{height}", scene
+
+
+def speed(plan: Plan) -> Iterator[Row]:
+    """Time steps."""
+    for kind, name, scene in timed_scenes(plan):
+        times = bench(scene, "exact", Backend.on(plan.device), plan.repeats, 0)
+        yield Row(f"step, {name}", spread(times["step"]))
+        size = (len(scene), scene.canvas.width, scene.canvas.height)
+        has_goal = plan.has_goals and plan.is_cuda and size == plan.sizes[-1]
+        good = not has_goal or times["forward_backward"]["median"] <= GOALS[kind]
+        wanted = f"at most {GOALS[kind]:g} ms" if has_goal else ""
+        yield Row(f"forward and backward, {name}", spread(times["forward_backward"]), wanted, good)
+        slowest = sorted(times["kernels"].items(), key=lambda pair: -pair[1]["median"])[:4]
+        yield Row(f"slowest kernels, {name}", ", ".join(f"{key} {one['median']:.3f}" for key, one in slowest))
+
+
+def missing_torch(plan: Plan) -> str:
+    """Return why PyTorch cannot be used with the device; empty if it can."""
+    try:
+        check_torch(wp.get_device(plan.device))
+    except UsageError as error:
+        return str(error)
+    return ""
+
+
+def through_torch(plan: Plan) -> Iterator[Row]:
+    """Time passes through PyTorch."""
+    missing = missing_torch(plan)
+    if missing:
+        yield Row("through PyTorch", missing, "", None)
+        return
+    for _, name, scene in timed_scenes(plan):
+        ratio = time_torch(renderer_for(scene, plan.device), plan.repeats)["ratio"]
+        yield Row(f"through PyTorch, {name}", f"{ratio:.2f} times as long")
 
 
 def spread(times: dict[str, float]) -> str:
@@ -199,7 +230,10 @@ def quality(plan: Plan) -> Iterator[Row]:
     """Vectorize pictures on the CPU and on the device."""
     differences = []
     for path in plan.pictures:
-        image = np.asarray(Image.open(path).convert("RGB"), np.float32) / 255
+        opened = Image.open(path).convert("RGB")
+        if plan.side:
+            opened.thumbnail((plan.side, plan.side))
+        image = np.asarray(opened, np.float32) / 255
         settings = make_settings(curves=plan.curves, iterations=plan.iterations or 1000, subject="photo")
         found = []
         for device in ("cpu", plan.device):
@@ -217,48 +251,67 @@ def quality(plan: Plan) -> Iterator[Row]:
 
 def streams(plan: Plan) -> Iterator[Row]:
     """Render from two threads, each on a stream of its own (on a CPU: only from two threads)."""
+    missing = missing_torch(plan)
+    if missing:
+        yield Row("two streams", missing, "all", None)
+        return
     import torch
 
+    from warpsplat.torch import engine
+
     count = 8
-    renders = [torch_render(seed, plan.device) for seed in range(2)]
+    renders = [torch_render(mixed_scene(96, 80, seed=seed), plan.device) for seed in range(2)]
     expected = [render() for render in renders]
     found: list[list[Any]] = [[], []]
 
-    def work(index: int) -> None:
-        stream = torch.cuda.Stream(plan.device) if plan.is_cuda else None
-        with torch.cuda.stream(stream):
-            for _ in range(count):
-                found[index].append(renders[index]())
+    def on_a_stream(work: Callable[[], None]) -> None:
+        with torch.cuda.stream(torch.cuda.Stream(plan.device) if plan.is_cuda else None):
+            work()
 
-    workers = [threading.Thread(target=work, args=(index,)) for index in range(2)]
+    def several(index: int) -> None:
+        found[index] += [renders[index]() for _ in range(count)]
+
+    workers = [
+        threading.Thread(target=on_a_stream, args=(functools.partial(several, index),)) for index in range(2)
+    ]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    same = sum(
-        all(torch.equal(a, b) for a, b in zip(one, usual, strict=True))
-        for usual, many in zip(expected, found, strict=True)
-        for one in many
-    )
+    same = sum(equal(one, usual) for usual, many in zip(expected, found, strict=True) for one in many)
     yield Row("two streams", f"{same} of {2 * count} as in turn", "all", same == 2 * count)
 
+    engine.KEPT = 1
+    renders = [torch_render(random_scene(Kind.FILL, 20 + i, 96, 80), plan.device) for i in range(count)]
+    expected, late = [render() for render in renders], list[list[Any]]()
+    on_a_stream(lambda: late.extend(render() for render in renders))
+    same = sum(map(equal, late, expected))
+    yield Row("renderers freed while they are at work", f"{same} of {count} as in turn", "all", same == count)
 
-def torch_render(seed: int, device: str) -> Callable[[], list[Any]]:
-    """Return a function that renders a scene and returns the image and its gradients."""
+
+def equal(some: Sequence[Any], others: Sequence[Any]) -> bool:
+    """Return whether tensors are equal, once all work on their device is done."""
+    import torch
+
+    if some[0].is_cuda:
+        torch.cuda.synchronize(some[0].device)
+    return all(map(torch.equal, some, others))
+
+
+def torch_render(scene: Scene, device: str) -> Callable[[], list[Any]]:
+    """Return a function that renders a scene and returns the image and its gradients, maybe before they are
+    computed.
+    """
     import torch
 
     from warpsplat.torch import SceneTensors, render
 
-    scene = mixed_scene(96, 80, seed=seed)
     tensors = SceneTensors.of(scene, torch.device(device), requires_grad=True)
     inputs = [value for value in tensors.values.values() if value.requires_grad]
 
     def run() -> list[Any]:
         image = render(tensors, 96)
-        found = [image.detach(), *torch.autograd.grad(image.square().sum(), inputs)]
-        if device.startswith("cuda"):
-            torch.cuda.current_stream(device).synchronize()
-        return found
+        return [image.detach(), *torch.autograd.grad(image.square().sum(), inputs)]
 
     return run
 
@@ -285,7 +338,8 @@ PARTS: dict[str, tuple[Callable[[Plan], Iterator[Row]], int]] = {
     "kernels": (kernels, 100),
     "agreement": (agreement, 40),
     "bits": (bits, 20),
-    "speed": (speed, 60),
+    "speed": (speed, 40),
+    "torch": (through_torch, 20),
     "streams": (streams, 15),
     "memory": (memory, 15),
     "quality": (quality, 90),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from tests import fake_cuda
 from warpsplat.kernels import constants
 from warpsplat.rendering.program import Program, bind, capture
 
@@ -88,3 +89,45 @@ def test_refused_and_empty_launches_are_not_recorded() -> None:
 
 def test_several_cpu_threads_are_not_given_up_for_a_graph() -> None:
     assert capture(wp.get_device("cpu"), [Program(wp.get_device("cpu"), 2)]) is None
+
+
+GRAPHS = """
+import logging, warp as wp
+from tests import fake_cuda
+from warpsplat.kernels import lanes
+from warpsplat.rendering.device import start_warp
+from warpsplat.rendering.program import Program, Replay
+
+start_warp()
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+device = wp.get_device("cuda:0")
+by_lane = wp.array([[1, 2], [3, 4], [5, 6]], dtype=wp.float32, device=device)
+for fault in ("", "capture", "graph", "graph", ""):
+    fake_cuda.options.fail = fault
+    sums = wp.zeros(3, dtype=wp.float32, device=device)
+    program = Program(device, threads=3)
+    program.launch(lanes.lane_sums, 3, by_lane=by_lane, sums=sums, split=True)
+    replay = Replay(device, [program])
+    for _ in range(2):
+        sums.zero_()
+        replay()
+    print(fault or "none", *sums.numpy().tolist(), replay.graph is not None, device.is_capturing)
+"""
+"""Run a program as a graph while graphs fail."""
+
+
+def test_a_gpu_does_without_graphs_that_it_refuses() -> None:
+    """Each kernel is launched by itself then, whatever number of CPU threads was asked for, and this is said
+    once for each cause."""
+    done = fake_cuda.run("-c", GRAPHS)
+    assert done.returncode == 0, done.stderr
+    wanted = [
+        f"{fault} 3.0 7.0 11.0 {fault == 'none'} False"
+        for fault in ("none", "capture", "graph", "graph", "none")
+    ]
+    assert done.stdout.splitlines() == wanted
+    told = [line for line in done.stderr.splitlines() if "without a graph" in line]
+    assert len(told) == 2
+    assert "not permitted" in told[0]
+    assert "out of memory" in told[1]
+    assert len(done.stderr.splitlines()) == 2, "what Warp says itself is hidden"

@@ -5,21 +5,26 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
+import warpsplat
 from tests import ROOT
 from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from warpsplat.extensions import renderer_names
 from warpsplat.files.sources import image_of
+from warpsplat.fit import clear
+from warpsplat.fit.export import show
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
-from warpsplat.scene import Kind
+from warpsplat.scene import Kind, Scene
 from warpsplat.svg.write import read_metadata
 
 CAT = ROOT / "docs" / "images" / "cat.jpg"
@@ -194,4 +199,32 @@ def test_work_grows_to_one(device: str, strategy: str) -> None:
 def test_a_time_budget_is_not_missed_by_hundredths_of_a_second() -> None:
     score = score_svg('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 8"/>', picture(8, 8))
     settings = make_settings(time_budget=2.0)
-    assert [len(missed_goals(settings, score, seconds)) for seconds in (1.9, 2.1, 2.3)] == [0, 0, 1]
+    assert [len(missed_goals(settings, score, seconds, 0.0)) for seconds in (1.9, 2.1, 2.3)] == [0, 0, 1]
+
+
+def test_compiling_is_told_apart_where_it_took_the_time() -> None:
+    score = score_svg('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 8"/>', picture(8, 8))
+    settings = make_settings(time_budget=5.0)
+    (goal,) = missed_goals(settings, score, 10.8, 7.04)
+    assert goal == "time-budget 5 s: took 10.8 s, of which compiling took 7.0 s, which later runs do not need"
+    (goal,) = missed_goals(settings, score, 10.8, 2.0)
+    assert goal == "time-budget 5 s: took 10.8 s"
+    assert not missed_goals(settings, score, 5.1, 5.0)
+
+
+def test_a_run_can_be_stopped_while_outlines_are_drawn_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file says that it was cut short, as that of a run that was stopped before."""
+    rounds = list[str]()
+
+    def counted(text: str, scene: Scene) -> Image.Image:
+        rounds.append(text)
+        return show(text, scene)
+
+    monkeypatch.setattr(clear, "show", counted)
+    image = np.dstack([picture(), np.tri(*picture().shape[:2], dtype=np.float32)])
+    options: dict[str, Any] = {"subject": "photo", "iterations": 20, "device": "cpu", "threads": 1}
+    stopped = warpsplat.vectorize(image, 8, stop=lambda: bool(rounds), **options)
+    assert stopped.stopped
+    assert len(rounds) == 1
+    assert not warpsplat.vectorize(image, 8, **options).stopped
+    assert len(rounds) > 2

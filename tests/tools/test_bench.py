@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from tests import fake_cuda
 from tests.cli.helpers import one_line, run
 
 
@@ -30,12 +31,24 @@ def test_bench_table(kind: str, renderer: str, capsys: pytest.CaptureFixture[str
     assert "composite_backward" in shown
 
 
+@pytest.mark.needs("torch")
 def test_bench_through_torch(capsys: pytest.CaptureFixture[str]) -> None:
     options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--threads", 1, "--device", "cpu", "--torch")
     assert run("bench", *options) == 0
     shown = capsys.readouterr().out
     assert "alternately, torch" in shown
     assert "through PyTorch" in shown
+
+
+@pytest.mark.slow
+@pytest.mark.needs("torch")
+def test_bench_through_a_torch_without_cuda(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is said before anything is timed."""
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")  # the test device knows nothing of that
+    done = fake_cuda.run("-m", "warpsplat", "bench", "--size", "32x32", "--device", "cuda:0", "--torch")
+    assert done.returncode == 2
+    assert not done.stdout
+    assert "cannot use cuda:0" in one_line(done.stderr)
 
 
 @pytest.mark.parametrize("size", ["0x10", "10", "16x", "99999x99999", "axb"])

@@ -89,3 +89,17 @@ def test_a_fault_is_one_clear_line(function: Callable[[torch.Tensor], Any], mess
     with pytest.raises(UsageError, match=message) as caught:
         evaluate(CustomLoss(function).on("cpu"), np.full((9, 7, 3), 0.5, np.float32))
     assert "\n" not in str(caught.value)
+
+
+def test_a_loss_is_computed_where_torch_can(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A PyTorch without CUDA beside a GPU."""
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    places = list[torch.device]()
+
+    def loss(render: torch.Tensor) -> torch.Tensor:
+        places.append(render.device)
+        return render.square().mean()
+
+    found = evaluate(CustomLoss(loss, torch=True).on("cuda:0"), PICTURE)
+    assert places == [torch.device("cpu")]
+    np.testing.assert_allclose(found.value, np.square(PICTURE).mean(), rtol=1e-6)

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.fit.export import export, show
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings
-from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import FloatArray, Scene
@@ -33,10 +34,8 @@ NEIGHBOUR_WEIGHT = 0.05
 """Weight of the pixels around one that should be empty: a viewer may show what has no coverage here."""
 
 
-def clear_empty(
-    scene: Scene, target: FloatArray, settings: Settings, backend: Backend, per_pixel: float
-) -> Scene:
-    """Move points so that the file shows nothing where the image is empty.
+def clear_empty(scene: Scene, target: FloatArray, settings: Settings, run: Run, per_pixel: float) -> Scene:
+    """Move points so that the file shows nothing where the image is empty, until the run has to end.
 
     ``scene`` is on a transparent canvas, and is rounded as in the file; ``target`` is premultiplied with
     opacity, shape (height, width, 4).
@@ -45,8 +44,10 @@ def clear_empty(
     for picture in scene.pictures:  # which are drawn as they are
         (top, left), (height, width) = picture.corner, picture.pixels.shape[:2]
         empty[top : top + height, left : left + width] &= picture.pixels[..., 3] == 0
-    best, fewest = scene, -1
+    best, fewest, renderer = scene, -1, None
     for number in range(MAX_ROUNDS):
+        if run.over():
+            break
         tried = rounded(scene, per_pixel)
         shown = np.asarray(show(export(tried, settings, per_pixel), tried).convert("RGBA"))
         spill = empty & (shown[..., 3] > 0)
@@ -55,17 +56,20 @@ def clear_empty(
             best, fewest = tried, count
         if count == 0:
             break
-        scene = _drawn_back(scene, spill, backend, FIRST_MOVE * (1 + number / ROUNDS_PER_MOVE))
+        viewport = Viewport(target.shape[1], target.shape[0])
+        renderer = renderer or Renderer(Parameters(scene, run.backend), viewport)
+        scene = _drawn_back(scene, spill, renderer, FIRST_MOVE * (1 + number / ROUNDS_PER_MOVE))
     return best
 
 
-def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], backend: Backend, reach: float) -> Scene:
-    """Move points against the gradient of the opacity of the pixels ``spill``, by ``reach`` [px] at most."""
-    height, width = spill.shape
-    thin = replace(scene, opacities=np.full_like(scene.opacities, PROBE_OPACITY))
-    renderer = Renderer(Parameters(thin, backend), Viewport(width, height, 1.0))
+def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], renderer: Renderer, reach: float) -> Scene:
+    """Move points against the gradient of the opacity of the pixels ``spill``, by ``reach`` [px] at most.
+
+    ``renderer``: of these shapes, with any values.
+    """
+    renderer.parameters.assign(replace(scene, opacities=np.full_like(scene.opacities, PROBE_OPACITY)))
     renderer.forward_complete()
-    gradient = np.zeros((height, width, 4), np.float32)
+    gradient = np.zeros((*spill.shape, 4), np.float32)
     around = cv2.dilate(spill.astype(np.uint8), np.ones((3, 3), np.uint8))
     gradient[..., 3] = spill + NEIGHBOUR_WEIGHT * around
     renderer.write_image_grad(gradient)

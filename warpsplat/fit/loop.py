@@ -41,6 +41,7 @@ from warpsplat.fit.schedule import (
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState, Past
 from warpsplat.fit.step import Step, Target
+from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.rendering.failures import failures_of
 from warpsplat.scene import Scene
 from warpsplat.scene.arrays import from_arrays, to_arrays
@@ -87,19 +88,14 @@ def fit(
         CheckpointError: the run's ``checkpoint`` holds something else than the state of this fit.
     """
     start = start or Start()
-    settings, image = problem.settings, problem.target
-    rng = np.random.default_rng(settings.seed)
-    scene = start.below or start.scene or grid_scene(settings, image, shapes_at(settings, 0), rng)
-    palette = Palette.of(settings, image)
-    if palette:
-        scene = replace(scene, canvas=palette.canvas(scene.canvas))
+    training = _Training(problem, run, start, rounding)
+    scene, rng = training.first_scene(problem.settings)
     checkpoint = run.checkpoint
     if checkpoint:
         checkpoint.begin()
         if checkpoint.result:
             with checkpoint.reading():
                 return _fit_from(checkpoint.result, scene)
-    training = _Training(problem, run, start, rounding, palette)
     try:
         with failures_of(run.backend.device):
             return _trained(training, scene, rng)
@@ -138,12 +134,11 @@ class _Training:
 
     step: Step
 
-    def __init__(
-        self, problem: Problem, run: Run, start: Start, rounding: Rounding | None, palette: Palette | None
-    ) -> None:
+    def __init__(self, problem: Problem, run: Run, start: Start, rounding: Rounding | None) -> None:
         self.image, self.settings, self.run = problem.target, problem.settings, run
         self.loss = problem.loss
-        self.start, self.rounding, self.palette = start, rounding, palette
+        self.start, self.rounding = start, rounding
+        self.palette = Palette.of(self.settings, self.image)
         self.plan = phases(self.settings, *problem.size)
         finest = Target(self.image, self.plan[-1]).image
         self.weights = pixel_weights(finest, problem.importance, self.settings.texture)
@@ -152,7 +147,14 @@ class _Training:
         """Whether the number of shapes follows the schedule."""
         self.base = len(start.below) if start.below else 0
         self.budget: Budget | None = None
-        self.started = time.monotonic()
+        self.started, self.compiled = time.monotonic(), compile_seconds()
+
+    def first_scene(self, settings: Settings) -> tuple[Scene, np.random.Generator]:
+        """Return the shapes that a fit with these settings starts from, and its source of random numbers."""
+        start, rng = self.start, np.random.default_rng(settings.seed)
+        scene = start.below or start.scene or grid_scene(settings, self.image, shapes_at(settings, 0), rng)
+        canvas = self.palette.canvas(scene.canvas) if self.palette else scene.canvas
+        return replace(scene, canvas=canvas), rng
 
     def resume(self, content: Content, scene: Scene) -> None:
         """Continue from a saved state of a fit that began with ``scene``."""
@@ -162,16 +164,24 @@ class _Training:
     def begin(self, scene: Scene, rng: np.random.Generator) -> None:
         """Make the first step."""
         begin, settings = self.start.begin, self.settings
-        state = FitState.start(scene, self.run.backend, rng, begin, self.base, self.start.past)
+        state = self._state(scene, rng)
         if self.run.deadline < math.inf:
             self.budget = Budget(self.run.deadline)
             settings = self.budget.measure(state, settings, self.image, self.loss)
-        self.started = time.monotonic()
+            if shapes_at(settings, 0) != shapes_at(
+                self.settings, 0
+            ):  # there is no time for shapes to come later
+                state = self._state(*self.first_scene(settings))
+        self.started, self.compiled = time.monotonic(), compile_seconds()
         if self.loss_at(settings, begin) is not self.loss:  # let its faults end the run now
             Step(state, settings, Target(self.image, self.plan[0], loss=self.loss)).measured_error()
         step = Step(state, settings, self.target(settings, begin))
         self.step = densify(step, grows=True) if self.start.below is not None else step
         self.advance()
+
+    def _state(self, scene: Scene, rng: np.random.Generator) -> FitState:
+        start = self.start
+        return FitState.start(scene, self.run.backend, rng, start.begin, self.base, start.past)
 
     def target(self, settings: Settings, step: int) -> Target:
         """Return what the step after ``step`` steps is compared with."""
@@ -185,8 +195,7 @@ class _Training:
 
     def is_over(self) -> bool:
         """Return whether there is no further step."""
-        done = self.step.state.step >= self.step.settings.iterations
-        return done or bool(self.budget and self.budget.over())
+        return self.step.state.step >= self.step.settings.iterations
 
     def advance(self) -> None:
         """Make a step, and report it where that is due."""
@@ -231,7 +240,11 @@ class _Training:
         return Progress(done, settings.iterations, step.psnr(), seconds, work, fine, shapes, snapshot)
 
     def adjust(self) -> None:
-        """Do what is due after the steps so far: rounding, an evaluation of the file, densification."""
+        """Do what is due after the steps so far: rounding, an evaluation of the file, densification.
+
+        If the time is up, the last steps are planned.
+        """
+        short = bool(self.budget and self.budget.over()) and self._end()
         step = self.step
         state, settings, done = step.state, step.settings, step.state.step
         if self.rounding:
@@ -242,7 +255,7 @@ class _Training:
         evaluates = settings.viewer and self.rounding and step.target.phase is self.plan[-1] and late
         if evaluates and not state.rounding and done % EVALUATE_INTERVAL == 0:
             evaluate_file(step)
-        due = self._is_due()
+        due = self._is_due() or short
         if due:
             self._fit_goals()
         settings = step.settings
@@ -252,6 +265,16 @@ class _Training:
             self.step = densify(step, grows=self.grows)
         elif done % EVALUATE_INTERVAL == 0:
             state.scene()  # so that the host knows it, whatever happens to the device
+
+    def _end(self) -> bool:
+        """Plan the last steps, at the present size; return whether shapes are missing, to be placed now."""
+        step, self.budget = self.step, None
+        state, settings = step.state, step.settings
+        missing = self.grows and state.parameters.shape_count < state.base + settings.curves
+        last = max(state.step + (CHECK_INTERVAL if missing else 1), self.start.begin + CHECK_INTERVAL)
+        coarse = settings.coarse if step.target.phase is self.plan[-1] else 1.0
+        step.configure(replace(settings, iterations=min(last, settings.iterations), coarse=coarse))
+        return missing
 
     def _round(self, rounding: Rounding) -> None:
         """Round and hold what is due after the steps so far."""
@@ -277,7 +300,8 @@ class _Training:
         if done >= settings.density.stop * settings.iterations:
             return
         if self.budget and step.target.phase is self.plan[0]:  # later the schedule stays as it is
-            slowness = (time.monotonic() - self.started) / (done * self.budget.costs[0])
+            worked = time.monotonic() - self.started - (compile_seconds() - self.compiled)
+            slowness = worked / (done * self.budget.costs[0])
             step.configure(self.budget.fit(settings, done, slowness))
         if self.grows and settings.max_bytes:
             step.configure(affordable(step))

@@ -23,7 +23,7 @@ from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.forms import record_gather
 from warpsplat.rendering.models import Model
-from warpsplat.rendering.program import Program, capture
+from warpsplat.rendering.program import Program, Replay
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import FloatArray
@@ -126,16 +126,12 @@ class Step:
             *(program for level in levels for program in level_programs(level, state.parameters)),
             update,
         )
-        self._graph = None if self.target.loss else capture(backend.device, self.programs)
+        self.replay = Replay(backend.device, self.programs, captured=not self.target.loss)
 
     def advance(self) -> None:
         """Do the step. Nothing is allocated or read back."""
         self.renderer.check_current()
-        if self._graph:
-            wp.capture_launch(self._graph)
-        else:
-            for program in self.programs:
-                program.run()
+        self.replay()
         self.state.step += 1
 
     def time(self, count: int) -> None:

@@ -23,6 +23,7 @@ from warpsplat.pydiffvg.layout import IDENTITY, KEPT, coordinates, indices, segm
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.device import start_warp
 from warpsplat.rendering.device_lock import device_lock
+from warpsplat.torch.cuda import shared_stream
 
 Tensor = torch.Tensor
 
@@ -88,16 +89,11 @@ def _nearest(curves: Curves, controls: Tensor, positions: Tensor, threads: int) 
     arrays |= {"nearest": wp.from_torch(found)}
     arrays |= {name: wp.from_torch(numbers[i]) for i, name in enumerate(("parameter", "sign"))}
     backend = Backend.on(wp.device_from_torch(device), threads)
-    with device_lock(backend.device), wp.ScopedStream(_stream(device)):
+    with device_lock(backend.device), shared_stream(device):
         program = backend.program()
         program.launch(kernels.nearest_points, count, arrays, split=True)
         program.run()
     return found.long(), numbers[0], numbers[1]
-
-
-def _stream(device: torch.device) -> wp.Stream | None:
-    """Return torch's current stream; none on a CPU."""
-    return None if device.type == "cpu" else wp.stream_from_torch(torch.cuda.current_stream(device))
 
 
 @functools.lru_cache(maxsize=KEPT)

@@ -105,6 +105,11 @@ def first_error(lines: list[str]) -> str:
     return next((line for line in found if "error:" in line), found[0] if found else "")
 
 
+def compile_seconds() -> float:
+    """Return how long this process has waited for kernels to be compiled [s]."""
+    return _compiler().seconds if _compiler.cache_info().currsize else 0.0
+
+
 def compiling() -> bool:
     """Return whether the compiler is working: a process that ends then must not remove its files."""
     return _compiler.cache_info().currsize > 0 and _compiler().is_busy()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import ctypes
 import functools
 import itertools
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +15,13 @@ from typing import Any
 
 import warp as wp
 
+from warpsplat.errors import cause_of
+from warpsplat.native import messages_hidden
 from warpsplat.rendering.device_lock import exclusive
 from warpsplat.rendering.helpers import LaunchRequest, helpers
 from warpsplat.rendering.kernel_cache import load
+
+log = logging.getLogger(__name__)
 
 PIECES_PER_THREAD = 4
 """A split launch is cut finer than there are threads, so that uneven pieces balance."""
@@ -42,7 +48,7 @@ class Program:
     def __init__(self, device: wp.Device, threads: int = 1, stage: str = "") -> None:
         """``threads``: of a CPU. Where no thread can be started, the caller's does the work."""
         self.device = device
-        self.threads = threads
+        self.threads = threads if device.is_cpu else 1
         self.stage = stage
         """Name of the launches that are added from now on, for ``run_timed``."""
         self.launches: list[Launch] = []
@@ -157,8 +163,36 @@ def launch_on_host(kernel: wp.Kernel, count: int, *sources: object, **values: An
     program.run()
 
 
+class Replay:
+    """Programs in order: as one graph, without Python in between, where there can be one."""
+
+    def __init__(self, device: wp.Device, programs: Sequence[Program], *, captured: bool = True) -> None:
+        """``captured``: whether a graph may be made, which runs nothing on the host."""
+        self._device, self._programs = device, programs
+        self.graph = capture(device, programs) if captured else None
+
+    def __call__(self) -> None:
+        """Run the programs."""
+        if not (self.graph and self._launch(self.graph)):
+            for program in self._programs:
+                program.run()
+
+    def _launch(self, graph: wp.Graph) -> bool:
+        """Launch the graph; return whether it could be instantiated, which its first launch does."""
+        try:
+            with contextlib.nullcontext() if graph.graph_exec else _quiet(self._device):
+                wp.capture_launch(graph)
+            return True
+        except RuntimeError as error:
+            if self._device.is_cpu or graph.graph_exec:
+                raise
+            self.graph = None
+            _do_without_graph(self._device, error)
+            return False
+
+
 def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
-    """Capture a graph that replays ``programs`` without Python in between; None where that is not possible.
+    """Capture a graph that replays ``programs``; None where that is not possible.
 
     A CPU graph runs on one thread, so it is not used instead of several threads; nor is one captured while
     other threads work (``device_lock``), whose launches would become part of it. A GPU needs its memory pool,
@@ -172,10 +206,34 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
     with exclusive() as alone:
         if not alone and device.is_cpu:
             return None
-        with wp.ScopedCapture(device) as captured:
-            for program in programs:
-                program.run()
+        try:
+            with _quiet(device), wp.ScopedCapture(device) as captured:
+                for program in programs:
+                    program.run()
+        except RuntimeError as error:  # what else is wrong with a launch shows without a graph as well
+            _do_without_graph(device, error)
+            return None
         return captured.graph
+
+
+def _quiet(device: wp.Device) -> contextlib.AbstractContextManager[object]:
+    """Hide what Warp prints about calls that CUDA refuses."""
+    return messages_hidden() if device.is_cuda else contextlib.nullcontext()
+
+
+def _do_without_graph(device: wp.Device, error: RuntimeError) -> None:
+    """Go on after a graph that could not be made; what was recorded of it is freed with it."""
+    _announce_launches(str(device), cause_of(error))
+    if device.is_cuda:
+        # CUDA keeps the error of a call for whoever asks next, and CUB asks after each of its launches.
+        with _quiet(device):
+            device.runtime.core.wp_cuda_context_check(device.context)
+
+
+@functools.cache
+def _announce_launches(device: str, cause: str) -> None:
+    """Log, once per process, why a GPU is slower than it could be."""
+    log.info("%s: kernels are launched one by one, without a graph: %s", device, cause)
 
 
 def part(whole: wp.Launch, start: int, shape: tuple[int, ...]) -> wp.Launch:

@@ -23,6 +23,7 @@ from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
+from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.rendering.failures import failures_of
 from warpsplat.run.arguments import backend_on, check_keywords, custom_loss, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
@@ -32,7 +33,7 @@ from warpsplat.run.memory import DeviceMemory, check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
 from warpsplat.run.svg import SvgSource, svg_name_of, text_of
-from warpsplat.run.tracking import failed, recorded, timed
+from warpsplat.run.tracking import before_clearing, failed, recorded, timed
 from warpsplat.run.typed import RefineOptions
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.page import OUR_VIEW, on_sheet_of, picture_view, with_view
@@ -117,7 +118,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
 
     A picture on a sheet (``svg.page``) stays on it. Arguments and errors are those of ``refine``.
     """
-    begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
+    begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
+    checkpoint = run.checkpoint
     run = timed(recorded(run, history), problem.settings, problem.target)
     given, view = text, None
     if OUR_VIEW.match(text):
@@ -129,21 +131,22 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     before = score_svg(text, target, perceptual=False)
     settings = _settings(problem.settings, len(scene))
     problem = replace(problem, target=target, settings=settings)
-    made = fit(problem, run, Start(scene=scene))
+    made = fit(problem, before_clearing(run, target), Start(scene=scene))
     judged = problem.loss or settings.loss != "l2"  # on the device
     if run.failures and (judged or not made.iterations):
         raise run.failures[0]
-    if checkpoint and made.interrupted:
-        checkpoint.save()
-    release_memory()
     refined = made.scene
     if target.shape[2] == 4 and not made.interrupted:
         try:
             with failures_of(run.backend.device):
-                refined = clear_empty(refined, target, settings, run.backend, made.per_pixel)
+                refined = clear_empty(refined, target, settings, run, made.per_pixel)
+            made = replace(made, interrupted=run.stopped())
         except DeviceError as failure:
             run.failures.append(failure)
             made = replace(made, interrupted=True)
+    if checkpoint and made.interrupted:
+        checkpoint.save()
+    release_memory()
     svg = write_svg(
         refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
     )
@@ -170,7 +173,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         seconds=seconds,
         stopped=made.interrupted,
         renewed=made.renewed,
-        missed=missed_goals(settings, score, seconds),
+        missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),
         history=tuple(history),
         before=before.psnr,
         kept=base.kept,

@@ -78,8 +78,8 @@ def arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
     if problem.target.shape[2] == 4 and not strategy.traces and not made.interrupted:
         from warpsplat.fit.clear import clear_empty
 
-        clear = clear_empty(made.scene, problem.target, settings, run.backend, made.per_pixel)
-        made = replace(made, scene=clear)
+        clear = clear_empty(made.scene, problem.target, settings, run, made.per_pixel)
+        made = replace(made, scene=clear, interrupted=run.stopped())
     if settings.ids and settings.subject != "line" and not soft:
         made = replace(made, scene=made.scene.take(by_color(made.scene)))
     return made

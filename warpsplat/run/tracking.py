@@ -22,6 +22,9 @@ RELEASE_INTERVAL = 10
 TAIL_SECONDS, TAIL_PER_PIXEL = 0.3, 3e-7
 """Part of a time budget that the last step, exporting and scoring take [s]."""
 
+CLEARING_SHARE = 0.1
+"""Share of the time of an image with transparency that is left to draw outlines back (``fit/clear.py``)."""
+
 
 def recorded(run: Run, history: list[Progress]) -> Run:
     """Return a run whose progress is recorded and never falls, and which releases memory now and then."""
@@ -68,3 +71,8 @@ def failed(run: Run, name: str, result: Result) -> DeviceError:
     error = DeviceError(text)
     error.result, error.is_lost = result, run.failures[0].is_lost
     return error
+
+
+def before_clearing(run: Run, target: FloatArray) -> Run:
+    """Return the run of a fit, after which there is time to draw outlines back from what is transparent."""
+    return run.within(1 - CLEARING_SHARE) if target.shape[2] == 4 else run

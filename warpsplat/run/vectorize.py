@@ -18,6 +18,7 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.native import release_memory
+from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
@@ -25,7 +26,7 @@ from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
-from warpsplat.run.tracking import failed, recorded, report_end, timed
+from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene
 from warpsplat.scene.geometry import most_seen
@@ -127,24 +128,26 @@ def make_result(
         ImageError: a problem with the image that shows only during the work.
         DeviceError: the device failed; what could be saved is written, and the error's ``result``.
     """
-    begun, history, checkpoint = time.monotonic(), list[Progress](), run.checkpoint
+    begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
+    checkpoint = run.checkpoint
     problem, reduction = image.problem, image.reduction
     target, settings = problem.target, problem.settings
     run = timed(recorded(run, history), settings, target)
     strategy = choose_strategy(settings) if start is None else STRATEGIES["fit"]
+    part = run if strategy.traces else before_clearing(run, target)
     with naming(image.name):
         if start is None:
-            made = _made(problem, strategy, run)
+            made = _made(problem, strategy, part)
         else:
             from warpsplat.fit.loop import fit
 
-            made = fit(problem, run, start)
+            made = fit(problem, part, start)
         if run.failures and not (made.iterations or strategy.traces):
             raise run.failures[0]
         report_end(made, run, history)
+        made = _arranged(made, problem, strategy, run)
         if checkpoint and made.interrupted:
             checkpoint.save()
-        made = _arranged(made, problem, strategy, run)
         if reduction:
             made, settings = reduction.enlarged(made), reduction.settings(settings)
         release_memory()
@@ -170,7 +173,7 @@ def make_result(
             renewed=made.renewed,
             renderer=settings.renderer,
             render_ssim=render_ssim,
-            missed=missed_goals(settings, score, seconds),
+            missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),
             levels=level_scores(scene, settings, made.per_pixel, target, reduction) if score else (),
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,

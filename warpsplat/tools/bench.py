@@ -20,7 +20,7 @@ from warpsplat.fit.settings import Density, Settings, default_rates
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.rendering.backend import Backend
-from warpsplat.rendering.program import capture
+from warpsplat.rendering.program import Replay
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.run.options import KINDS
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
@@ -81,7 +81,12 @@ def bench(
 
     Returns:
         results of ``time_steps``, counts, memory and, with ``through_torch``, results of ``time_torch``.
+
+    Raises:
+        UsageError: see ``check_torch``, ``through_torch`` only.
     """
+    if through_torch:
+        check_torch(backend.device)
     curves, width, height = len(scene), scene.canvas.width, scene.canvas.height
     settings = Settings(
         kind=Kind(int(scene.kind[0])),
@@ -130,18 +135,9 @@ def timed(device: wp.Device, work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-def passes_of(renderer: Renderer) -> Callable[[], None]:
+def passes_of(renderer: Renderer) -> Replay:
     """Return a function that runs the forward and the backward pass, as a graph where there can be one."""
-    graph = capture(renderer.backend.device, (renderer.forward_program, renderer.backward_program))
-
-    def run() -> None:
-        if graph:
-            wp.capture_launch(graph)
-        else:
-            renderer.forward()
-            renderer.backward()
-
-    return run
+    return Replay(renderer.backend.device, (renderer.forward_program, renderer.backward_program))
 
 
 def time_steps(step: Step, repeats: int) -> dict[str, Any]:
@@ -174,22 +170,29 @@ def time_steps(step: Step, repeats: int) -> dict[str, Any]:
     }
 
 
+def check_torch(device: wp.Device) -> None:
+    """Raise a ``UsageError`` if PyTorch is not installed, or cannot use ``device``."""
+    try:
+        import torch
+
+        from warpsplat.torch.cuda import can_use
+    except ImportError as error:
+        raise UsageError(str(error)) from None
+    if not can_use(str(device)):
+        raise UsageError(f"PyTorch {torch.__version__} cannot use {device}: install PyTorch with CUDA")
+
+
 def time_torch(own: Renderer, repeats: int) -> dict[str, Any]:
     """Time passes through PyTorch and the renderer's own alternately, ``repeats`` of each after a warm-up.
 
     Returns:
         summaries of ``own`` and ``torch``; ``ratio``, the median of PyTorch's time over the own time just
         before.
-
-    Raises:
-        UsageError: PyTorch is not installed.
     """
-    try:
-        import torch
+    import torch
 
-        from warpsplat.torch import SceneTensors, render
-    except ImportError as error:
-        raise UsageError(str(error)) from None
+    from warpsplat.torch import SceneTensors, render
+
     device, viewport = own.backend.device, own.viewport
     torch_device = wp.device_to_torch(device)
     tensors = SceneTensors.of(own.parameters.scene(), torch_device, requires_grad=True)

@@ -7,7 +7,7 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -21,9 +21,10 @@ from warpsplat.rendering.device import start_warp
 from warpsplat.rendering.device_lock import device_lock
 from warpsplat.rendering.models import Model
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.rendering.program import Program, capture
+from warpsplat.rendering.program import Program, Replay
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import OPACITY_RANGE, TRAITS, Scene
+from warpsplat.torch.cuda import is_capturing, shared_stream
 from warpsplat.torch.tensors import attributes_of
 
 KEPT = 32
@@ -99,9 +100,9 @@ class Engine:
         """Whether a CUDA graph of torch holds its programs, which then must stay as they are."""
         self._valid = dict(VALID)
         self._opaque = spec.opaque
+        self.device = backend.device
         self.bytes = self._renderer.bytes()
-        self._graphs: dict[Program, wp.Graph] = {}
-        self._stream: torch.cuda.Stream | None = None
+        self._graphs: dict[Program, Replay] = {}
 
     def _record(self, kernel: wp.Kernel, tiles: wp.array, backend: Backend, viewport: Viewport) -> Program:
         """Record a copy between tiles and an image, which ``_run`` binds as ``pixels``."""
@@ -134,26 +135,25 @@ class Engine:
         """Write the rendered image into ``image``, shape (height, width, 4)."""
         self._run(self._show, image)
 
-    def backward(self, image_grad: torch.Tensor, names: Iterable[str]) -> dict[str, torch.Tensor]:
-        """Return the gradients of the attributes ``names``; this uses up the forward pass.
+    def backward(self, image_grad: torch.Tensor, gradients: Mapping[str, torch.Tensor]) -> None:
+        """Write into ``gradients``, by the names of their attributes; this uses up the forward pass.
 
         ``image_grad``: gradient of the image, shape (height, width, 4).
         """
         self.ticket = None
         self._run(self._take, image_grad)
         self._replay(self._renderer.backward_program)
-        return {name: self._grads[name].clone() for name in names}
+        for name, gradient in gradients.items():
+            gradient.copy_(self._grads[name].reshape(gradient.shape))
 
     def _replay(self, program: Program) -> None:
         """Run a program: as a graph, without Python, on one CPU thread; a GPU does not wait for Python."""
+        replay: Callable[[], None] = self._graphs.get(program, program.run)
         if program.device.is_cpu and program not in self._graphs:
-            graph = capture(program.device, [program])
-            if graph is not None:
-                self._graphs[program] = graph
-        if program in self._graphs:
-            wp.capture_launch(self._graphs[program])
-        else:
-            program.run()
+            replay = made = Replay(program.device, [program])
+            if made.graph:
+                self._graphs[program] = made
+        replay()
 
     @staticmethod
     def _run(program: Program, image: torch.Tensor) -> None:
@@ -168,14 +168,6 @@ class Engine:
         self.is_captured = True
         if not self._opaque:
             self._valid["opacities"] = (0.0, OPACITY_RANGE[1])
-
-    def follow(self, device: torch.device) -> None:
-        """Make torch's current stream wait for the last call, which may have used another one."""
-        if device.type == "cuda":
-            stream = torch.cuda.current_stream(device)
-            if self._stream not in (None, stream):
-                stream.wait_stream(self._stream)
-            self._stream = stream
 
 
 engines: OrderedDict[tuple[object, ...], Engine] = OrderedDict()
@@ -194,6 +186,8 @@ def clear_cache() -> None:
     """
     with _engines_lock:
         engines.clear()
+        for engine in captured.values():
+            wp.synchronize_device(engine.device)  # torch may be replaying its graphs on any stream
         captured.clear()
 
 
@@ -204,15 +198,11 @@ def check_memory(spec: RenderSpec, count: int = 1) -> None:
 
 @contextlib.contextmanager
 def engine_of(spec: RenderSpec) -> Iterator[Engine]:
-    """Yield the engine of ``spec``, for this thread alone and on torch's current stream."""
-    device = _warp_device(spec.device)
-    capturing = is_capturing(spec.device)
-    with device_lock(device), _on_stream(spec.device, capturing):
+    """Yield the engine of ``spec``, for this thread alone and in ``shared_stream``."""
+    with device_lock(_warp_device(spec.device)), shared_stream(spec.device):
         with _engines_lock:
-            engine = _captured_engine(spec) if capturing else _kept_engine(spec)
+            engine = _captured_engine(spec) if is_capturing(spec.device) else _kept_engine(spec)
         with engine.lock:
-            if not capturing:
-                engine.follow(spec.device)
             yield engine
 
 
@@ -235,11 +225,6 @@ def _captured_engine(spec: RenderSpec) -> Engine:
     return engine
 
 
-def is_capturing(device: torch.device) -> bool:
-    """Return whether torch is capturing a CUDA graph on its current stream: nothing can be read back then."""
-    return device.type == "cuda" and torch.cuda.is_current_stream_capturing()
-
-
 def known(spec: RenderSpec) -> RenderSpec:
     """Return ``spec`` with the ``opaque`` of an engine that there is, preferably true: it suits all values.
 
@@ -251,25 +236,6 @@ def known(spec: RenderSpec) -> RenderSpec:
         if found.key in captured or found.key in engines:
             return found
     raise UsageError("a CUDA graph can only hold a scene of a structure and size that was rendered before")
-
-
-def _on_stream(device: torch.device, capturing: bool) -> contextlib.AbstractContextManager[object]:
-    """Have Warp work on torch's current stream, and take part in a capture there."""
-    if device.type == "cpu":
-        return contextlib.nullcontext()
-    stream = wp.stream_from_torch(torch.cuda.current_stream(device))
-    return _captured_stream(stream) if capturing else wp.ScopedStream(stream)
-
-
-@contextlib.contextmanager
-def _captured_stream(stream: wp.Stream) -> Iterator[None]:
-    """Have Warp work on a stream that torch captures."""
-    with wp.ScopedStream(stream, sync_enter=False):  # Warp's own stream is not part of the capture
-        wp.capture_begin(stream=stream, external=True)
-        try:
-            yield
-        finally:
-            wp.capture_end(stream=stream)
 
 
 _start = functools.cache(start_warp)

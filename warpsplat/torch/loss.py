@@ -10,19 +10,22 @@ import torch
 
 from warpsplat.errors import UsageError, shown
 from warpsplat.scene import FloatArray
+from warpsplat.torch.cuda import can_use
 
 
 def with_gradient(function: Callable[..., Any], device: str) -> Callable[..., tuple[FloatArray, FloatArray]]:
     """Return a function of arrays that returns what ``function`` makes of the tensors, and the gradient by
     the first of them.
 
-    It raises ``UsageError`` if there is none.
+    The tensors are on a device of Warp's, or on the CPU where this torch cannot use that. It raises
+    ``UsageError`` if there is no gradient.
     """
+    place = device if can_use(device) else "cpu"
 
     def evaluate(image: FloatArray, *target: FloatArray) -> tuple[FloatArray, FloatArray]:
         with torch.enable_grad():
-            render = torch.tensor(image, device=device, requires_grad=True)
-            value = function(render, *(torch.tensor(each, device=device) for each in target))
+            render = torch.tensor(image, device=place, requires_grad=True)
+            value = function(render, *(torch.tensor(each, device=place) for each in target))
             if not isinstance(value, torch.Tensor):
                 raise UsageError(f"the loss returned {shown(value)}, which is no tensor and has no gradient")
             found = (

@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 from warpsplat.scene.attributes import OPACITY_RANGE
-from warpsplat.torch.engine import RenderSpec, engine_of, is_capturing, known
+from warpsplat.torch.cuda import is_capturing
+from warpsplat.torch.engine import RenderSpec, engine_of, known
 from warpsplat.torch.tensors import check_extremes, extremes
 
 Tensor = torch.Tensor
@@ -72,8 +73,12 @@ def backward(
     spec: RenderSpec, ticket: int, values: Mapping[str, Tensor], image_grad: Tensor, wanted: Sequence[str]
 ) -> dict[str, Tensor]:
     """Return the gradients of the attributes ``wanted`` for that of an image, in the shapes of ``values``."""
+    image_grad = image_grad.contiguous()
+    found = {
+        name: torch.empty(values[name].shape, dtype=torch.float32, device=spec.device) for name in wanted
+    }
     with engine_of(spec) as engine:
         if engine.ticket != ticket:  # another call has used the buffers since
             engine.forward(values)
-        found = engine.backward(image_grad.contiguous(), wanted)
-    return {name: gradient.reshape(values[name].shape) for name, gradient in found.items()}
+        engine.backward(image_grad, found)
+    return found
