@@ -29,4 +29,5 @@ def main(channel: Connection, level: int, workers: int) -> None:
             status = "stopped"
         if what == "hang":
             time.sleep(60)
-        channel.send(Outcome(task.number, status, figures={"process": os.getpid()}))
+        blocked = sorted(signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+        channel.send(Outcome(task.number, status, figures={"process": os.getpid(), "blocked": blocked}))

@@ -140,7 +140,7 @@ def test_a_line_break_in_a_name_breaks_no_line(folder: Path, capsys: pytest.Capt
     assert capsys.readouterr().err.splitlines() == [
         "[1/1] failed: in/\\nx.png: no such file".replace("in/", f"{folder}/in/"),
         "failed:",
-        f"  {folder}/in/\\nx.png: no such file",
+        f"  {folder}/in/\\nx.png",
     ]
 
 

@@ -82,7 +82,7 @@ jobs: [{images: in/a.png}, {images: in/b.png, curves: 7}]
 @pytest.mark.parametrize(
     ("output", "made"),
     [
-        ("out", "out/c.svg"),
+        ("out", "out/deep/c.svg"),
         ("x.svg", "x.svg"),
         ("{folder}/{name}.svg", "deep/c.png.svg"),
         ("{preset}-{kind}-{renderer}.svg", "p-closed-exact.svg"),

@@ -43,7 +43,7 @@ jobs:
         ("in/a.png", "out/a.svg"),
         ("in/b.jpg", "out/b.jpg.svg"),
         ("in/b.png", "out/b.png.svg"),
-        ("in/deep/c.png", "other/c.svg"),
+        ("in/deep/c.png", "other/deep/c.svg"),
         ("in/broken.png", "other/broken.svg"),
     ]
     assert [j.settings.kind for j in jobs] == [Kind.FILL] * 3 + [Kind.STROKE] * 2
@@ -80,6 +80,51 @@ jobs:
     assert (first.settings.rates["points"], first.settings.rates["colors"]) == (0.5, 0.01)
     assert (second.settings.renderer, second.settings.basis) == ("exact", Basis.SPLINE)
     assert (second.settings.density.interval, second.settings.density.opacity_start) == (100, 0.3)
+
+
+def named(folder: Path, text: str, *images: str) -> list[str]:
+    """Return the results of a batch file beside some empty images."""
+    for image in images:
+        (folder / image).parent.mkdir(parents=True, exist_ok=True)
+        (folder / image).touch()
+    return sorted(job.output.relative_to(folder).as_posix() for job in load_jobs(write(folder, text)))
+
+
+def test_a_result_in_a_folder_keeps_the_folders_below_the_pattern(folder: Path) -> None:
+    text = "jobs: [{images: 'icons/**/*.png', output: out}]"
+    assert named(folder, text, "icons/logo.png", "icons/a/logo.png", "icons/b/x.png") == [
+        *("out/a/logo.svg", "out/b/x.svg", "out/logo.svg")
+    ]
+
+
+def test_images_of_one_name_from_several_patterns_share_no_result(folder: Path) -> None:
+    text = "jobs: [{images: [logo.png, 'icons/**/*.png'], output: out}]"
+    assert named(folder, text, "logo.png", "icons/logo.png", "icons/a/logo.png") == [
+        *("out/a/logo.svg", "out/icons/logo.svg", "out/logo.svg")
+    ]
+    text = "jobs: [{images: [photos/logo.jpg, icons/logo.png], output: out}]"
+    assert named(folder, text, "photos/logo.jpg") == ["out/logo.jpg.svg", "out/logo.png.svg"]
+
+
+def test_images_of_results_that_clash_are_named(folder: Path) -> None:
+    text = "jobs: [{images: 'icons/**/*.png', output: 'out/{stem}.svg'}]"
+    with pytest.raises(UsageError, match=r"of \S*icons/a/logo\.png and \S*icons/logo\.png; give a folder"):
+        named(folder, text, "icons/logo.png", "icons/a/logo.png")
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("jobs: [{images: in/a.png, curvs: 3}]", "curves"),
+        ("jobs: [{imagess: in/a.png}]", "images"),
+        ("jobs: [{images: in/a.png, density: {intervall: 3}}]", "interval"),
+        ("jobs: [{images: in/a.png, rates: {pints: 3}}]", "points"),
+        ("presets: {mine: {}}\njobs: [{images: in/a.png, preset: mime}]", "mine"),
+    ],
+)
+def test_the_nearest_name_is_suggested(folder: Path, text: str, meant: str) -> None:
+    with pytest.raises(UsageError, match=f"did you mean '{meant}'\\?$"):
+        load_jobs(write(folder, text))
 
 
 def test_without_output_beside_the_image(folder: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,16 @@ def test_workers_are_kept_and_their_notices_heard(tmp_path: Path, caplog: pytest
     assert [outcome.status for outcome in first + second] == ["made"] * 3
     assert len({outcome.figures["process"] for outcome in first + second}) == 1
     assert "a notice" in caplog.text
+
+
+def test_signals_are_blocked_in_the_first_worker_too(tmp_path: Path) -> None:
+    """The first process starts multiprocessing's resource tracker, which unblocks them."""
+    resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    with Pool(2) as used:
+        found = list(used.run(tasks(tmp_path, "a", "a"), never, ignored))
+    assert [outcome.figures["blocked"] for outcome in found] == [[signal.SIGINT, signal.SIGTERM]] * 2
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
 
 
 def test_a_death_costs_a_second_try_and_a_second_one_the_image(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ class BatchDisplay:
         self._seconds: list[float] = []
         """Time of each image that was made now."""
         self.failures: list[str] = []
+        """Images that failed; each cause is in a line of its own."""
         self.missed = False
         """Whether an image that was made now misses a goal."""
 
@@ -51,7 +52,7 @@ class BatchDisplay:
     def _count(self, outcome: JobOutcome) -> None:
         self._counts[outcome.status] += 1
         if outcome.error:
-            self.failures.append(outcome.error)
+            self.failures.append(printable(str(outcome.job.image)))
         figures = outcome.figures
         for name, values in (("psnr", self._psnr), ("bytes", self._bytes)):
             if figures.get(name) is not None:

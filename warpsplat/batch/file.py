@@ -11,6 +11,7 @@ import yaml
 
 from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
+from warpsplat.fit.options import nearest
 from warpsplat.run.names import ErrorAt
 
 MAX_FILE = 1 << 20
@@ -74,9 +75,8 @@ class BatchFile:
             line = key_node.start_mark.line + 1
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
-                raise self.error(
-                    line, f"unknown key {shown(key)} in {where}; known are: {', '.join(allowed)}"
-                )
+                hint = nearest(key, allowed) or f"; known are: {', '.join(allowed)}"
+                raise self.error(line, f"unknown key {shown(key)} in {where}{hint}")
             if key in result:
                 raise self.error(line, f"key {shown(key)} is there twice in {where}")
             result[key] = (line, value_node)

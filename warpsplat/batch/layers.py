@@ -16,6 +16,7 @@ import yaml
 
 from warpsplat.batch.file import BatchFile, plain
 from warpsplat.errors import UsageError, cut, shown
+from warpsplat.fit.options import nearest
 from warpsplat.run.names import ErrorAt
 from warpsplat.run.options import BY_NAME, KINDS, NESTED, RESEARCH_KEYS, settings_from
 
@@ -121,7 +122,9 @@ def assigned(text: str) -> tuple[str, Any]:
     if not found:
         raise UsageError(f"--set {cut(text)}: must be KEY=VALUE")
     if key not in KEYS or bool(dot) != (key in NESTED) or (dot and inner not in NESTED[key]):
-        raise UsageError(f"--set {cut(text)}: unknown key {shown(name)}; the keys are those of batch files")
+        known = [*KEYS, *(f"{outer}.{inner}" for outer in NESTED for inner in NESTED[outer])]
+        hint = nearest(name, known) or "; the keys are those of batch files"
+        raise UsageError(f"--set {cut(text)}: unknown key {shown(name)}{hint}")
     try:
         value = written if key in TEXT_KEYS else plain(written)
     except (yaml.YAMLError, ValueError, RecursionError) as error:

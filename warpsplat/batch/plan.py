@@ -36,6 +36,7 @@ from warpsplat.batch.presets import preset_layer, preset_names
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.remote import is_remote, is_url, remote
+from warpsplat.fit.options import nearest
 from warpsplat.fit.settings import Settings
 from warpsplat.run.names import (
     ErrorAt,
@@ -135,8 +136,9 @@ def _preset(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]], presets:
     line, node = entries[PRESET]
     name = file.text(line, PRESET, file.value(node))
     if name not in presets and name not in preset_names():
-        known = ", ".join((*presets, *preset_names()))
-        raise file.error(line, f"{PRESET}: there is no {shown(name)}; known are: {known}")
+        known = (*presets, *preset_names())
+        hint = nearest(name, known) or f"; known are: {', '.join(known)}"
+        raise file.error(line, f"{PRESET}: there is no {shown(name)}{hint}")
     values = presets[name] if name in presets else preset_layer(name)
     return {**values, PRESET: GivenValue(name, file.error_at(line), file.path.parent)}
 

@@ -9,6 +9,7 @@ import warpsplat.configs
 from warpsplat.batch.file import BatchFile
 from warpsplat.batch.layers import Layer, layer_of
 from warpsplat.errors import UsageError, shown
+from warpsplat.fit.options import nearest
 from warpsplat.run.options import BY_NAME, KINDS, NESTED, RESEARCH_KEYS
 
 FOLDER = Path(warpsplat.configs.__file__).parent / "presets"
@@ -33,8 +34,9 @@ def preset_layer(preset: str) -> Layer:
     path = Path(preset)
     if path.suffix.lower() not in ENDINGS:
         if preset not in preset_names():
-            known = ", ".join(preset_names())
-            raise UsageError(f"there is no preset {shown(preset)}; known are: {known}, or a file.yaml")
+            known = preset_names()
+            hint = nearest(preset, known) or f"; known are: {', '.join(known)}, or a file.yaml"
+            raise UsageError(f"there is no preset {shown(preset)}{hint}")
         path = FOLDER / f"{preset}.yaml"
     file = BatchFile(path)
     return layer_of(file, file.mapping(file.root, "a preset", KEYS))

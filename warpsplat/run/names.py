@@ -74,23 +74,15 @@ def fields_of(settings: Settings, given: Mapping[str, Any]) -> dict[str, Any]:
 def name_results(wanted: Sequence[ResultRequest], masks: Iterable[Path] = ()) -> list[Path]:
     """Return the path of each result; raise ``UsageError`` for an unknown field, and where paths collide.
 
-    All are different, and none is an image or one of the ``masks``. In a folder, a result has the image's
-    name, including its ending if there are both a.png and a.jpg.
+    All are different, and none is an image or one of the ``masks``. In an output folder, a result keeps the
+    folders below the fixed part of its pattern, see ``_in_folders``.
     """
-    folders = {
-        (item.output or item.image.path.parent, item.image.path)
-        for item in wanted
-        if not item.output or not is_pattern(str(item.output))
-    }
-    stems = Counter((folder, path.stem) for folder, path in folders)
-    outputs: list[Path] = []
-    for item in wanted:
-        path = item.image.path
-        folder = item.output or path.parent
-        if (folder, path) in folders:
-            outputs.append(folder / f"{path.stem if stems[folder, path.stem] == 1 else path.name}.svg")
-        else:
-            outputs.append(filled_in(item))
+    inside = [not item.output or not is_pattern(str(item.output)) for item in wanted]
+    named = _in_folders([item for item, is_inside in zip(wanted, inside, strict=True) if is_inside])
+    outputs = [
+        named[_folder(item), item.image.path] if is_inside else filled_in(item)
+        for item, is_inside in zip(wanted, inside, strict=True)
+    ]
     inputs = {_real(path) for path in (*(item.image.path for item in wanted), *masks)}
     counts = Counter(outputs)
     for item, output in zip(wanted, outputs, strict=True):
@@ -99,17 +91,62 @@ def name_results(wanted: Sequence[ResultRequest], masks: Iterable[Path] = ()) ->
             by = "its own result" if real == _real(path) else f"the result of {path}"
             raise item.error(f"output: {output} would be overwritten by {by}; give another one")
         if counts[output] > 1:
-            cause = f"{counts[output]} results would be {output}; give other outputs, as {EXAMPLE}"
-            raise item.error(f"output: {cause}")
+            images = dict.fromkeys(
+                o.image.path for o, name in zip(wanted, outputs, strict=True) if name == output
+            )
+            raise item.error(f"output: {counts[output]} results would be {output}{_way_out([*images])}")
     return outputs
+
+
+def _way_out(images: Sequence[Path]) -> str:
+    """Return the rest of a message about results of one name: their images, if several, and advice."""
+    if len(images) == 1:
+        return f"; give other outputs, as {EXAMPLE}"
+    more = f" and {len(images) - 2} more" if len(images) > 2 else ""
+    joined = ", ".join(map(str, images[:2])) if more else " and ".join(map(str, images))
+    return f", of {joined}{more}; give a folder as the output, or each its own"
+
+
+def _in_folders(items: Iterable[ResultRequest]) -> dict[tuple[Path, Path], Path]:
+    """Return the results, by folder and image, of requests without a name.
+
+    A result has the image's name, including its ending if there are both a.png and a.jpg. Results
+    that would still share a name keep the folders below the common parent of their images.
+    """
+    places = dict.fromkeys((_folder(item), item.image.path) for item in items)
+    names: dict[tuple[Path, str], set[str]] = {}
+    for folder, path in places:
+        names.setdefault((folder, path.stem), set()).add(path.name)
+    groups: dict[Path, list[tuple[Path, Path]]] = {}
+    for folder, path in places:
+        name = path.stem if len(names[folder, path.stem]) == 1 else path.name
+        groups.setdefault(folder / f"{name}.svg", []).append((folder, path))
+    outputs: dict[tuple[Path, Path], Path] = {}
+    for output, group in groups.items():
+        parents = [str(path.parent) for _, path in group]
+        local = len(group) > 1 and not any(is_remote(path) for _, path in group)
+        common = os.path.commonpath(map(os.path.abspath, parents)) if local else ""
+        for place, parent in zip(group, parents, strict=True):
+            below = os.path.relpath(parent, common) if local else ""
+            outputs[place] = output.parent / below / output.name
+    return outputs
+
+
+def _folder(item: ResultRequest) -> Path:
+    """Return the folder of a result that is given no name."""
+    return item.output / _below_root(item.image) if item.output else item.image.path.parent
+
+
+def _below_root(image: FoundImage) -> str:
+    """Return the folder of an image below the one in which it was searched."""
+    path, root = image
+    return path.parent.relative_to(root).as_posix() if is_remote(path) else os.path.relpath(path.parent, root)
 
 
 def filled_in(item: ResultRequest) -> Path:
     """Return the name of a result by its pattern; raise ``UsageError`` for an unknown field."""
-    path, root = item.image
-    away = is_remote(path)
-    folder = path.parent.relative_to(root).as_posix() if away else os.path.relpath(path.parent, root)
-    fields = {**item.fields, "stem": path.stem, "name": path.name, "folder": folder}
+    path = item.image.path
+    fields = {**item.fields, "stem": path.stem, "name": path.name, "folder": _below_root(item.image)}
 
     def value(found: re.Match[str]) -> str:
         if found[0] in ("{{", "}}"):

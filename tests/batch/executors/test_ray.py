@@ -359,3 +359,19 @@ def test_warns_of_waiting(
     with caplog.at_level(logging.WARNING):
         assert statuses(run(RayCluster(), large, lambda: next(polls, True))) == {0: "stopped"}
     assert caplog.text.count("no room yet for --threads 8: its 2 nodes have 2 CPUs and 0 GPUs in all") == 1
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("address", ["", "local", "elsewhere"])
+def test_only_a_cluster_of_its_own_that_has_died_ends_the_run(
+    ray: FakeRay, tasks: list[Task], address: str
+) -> None:
+    ray.known = {"elsewhere"}
+    ray.all.clear()
+    ray.free.clear()
+    polls = iter([False] * 5)
+    if address == "elsewhere":
+        assert statuses(run(RayCluster(address), tasks, lambda: next(polls, True)))
+    else:
+        with pytest.raises(ResourceError, match="has died"):
+            run(RayCluster(address), tasks, lambda: next(polls, True))

@@ -18,7 +18,7 @@ from warpsplat.batch.executors.ray_connection import connected, ray_cause
 from warpsplat.batch.executors.ray_worker import RayWorker, TaskResources
 from warpsplat.batch.executors.tasks import OnProgress, Outcome, Task
 from warpsplat.batch.executors.workers import WorkerExecutor
-from warpsplat.errors import UsageError, printable
+from warpsplat.errors import ResourceError, UsageError, printable
 
 log = logging.getLogger("warpsplat")
 
@@ -30,6 +30,14 @@ PAUSE = 1.0
 
 PATIENCE = 20.0
 """Seconds without any worker before a warning."""
+
+
+def check_alive(nodes: int) -> None:
+    """Raise ``ResourceError`` if a cluster that nobody else adds nodes to has none left."""
+    if not nodes:
+        raise ResourceError(
+            "the Ray cluster of this machine has died, perhaps for lack of memory; the same command continues"
+        )
 
 
 class RayCluster(WorkerExecutor[RayWorker]):
@@ -59,6 +67,8 @@ class RayCluster(WorkerExecutor[RayWorker]):
         self._ray: ModuleType = ray
         self._address, self._most, self._gpus = address, workers, gpus
         self._connection = contextlib.ExitStack()
+        self._own = False
+        """Whether the cluster was started for this."""
         self._asked = self._begun = 0.0
         """Times of the last questions to workers, and of the first search for one [s]; 0: not yet."""
 
@@ -74,6 +84,8 @@ class RayCluster(WorkerExecutor[RayWorker]):
         self._begun = self._begun or now
         if now - self._asked > PAUSE:
             self._asked = now
+            if self._own:
+                check_alive(len(self._nodes()))
             for worker in self._busy():
                 worker.ask_progress()
             self._hire()
@@ -87,7 +99,7 @@ class RayCluster(WorkerExecutor[RayWorker]):
 
     def _worker_for(self, task: Task) -> RayWorker | None:
         if not self._ray.is_initialized():
-            self._connection.enter_context(connected(self._ray, self._address))
+            self._own = self._connection.enter_context(connected(self._ray, self._address))
         needed = self._resources(task)
         found = next((w for w in self._workers if w.idle and w.resources == needed), None)
         if found is None:

@@ -16,8 +16,8 @@ from warpsplat.errors import UsageError, printable
 
 
 @contextlib.contextmanager
-def connected(ray: ModuleType, address: str) -> Iterator[None]:
-    """Connect to a cluster for a block.
+def connected(ray: ModuleType, address: str) -> Iterator[bool]:
+    """Connect to a cluster for a block; yield whether it was started for it.
 
     Args:
         ray: the package Ray.
@@ -28,25 +28,28 @@ def connected(ray: ModuleType, address: str) -> Iterator[None]:
     """
     with _quiet():
         with _signal_handlers_kept():
-            _connect(ray, address)
+            own = _connect(ray, address)
         try:
-            yield
+            yield own
         finally:
             with _signal_handlers_kept():
                 ray.shutdown()
 
 
-def _connect(ray: ModuleType, address: str) -> None:
+def _connect(ray: ModuleType, address: str) -> bool:
+    """Connect to a cluster, perhaps a new one; return whether it is new."""
     named = address or os.environ.get("RAY_ADDRESS", "")
     found = _own_address() if named in ("", "auto") else named
     try:
         if not _answers(found):  # Ray itself would try for minutes
             raise ConnectionError
         _init(ray, found)
+        return found == "local"
     except ConnectionError as error:
         if named:
             raise UsageError(f"--executor ray: no Ray cluster answers at {printable(named)}") from error
         _init(ray, "local")
+        return True
 
 
 def _own_address() -> str:
