@@ -10,13 +10,13 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks, hook_options
-from warpsplat.cli.options import FILE, Request, overwrite_option
+from warpsplat.cli.options import INPUT, Request, overwrite_option
 from warpsplat.errors import UsageError
 
 
 @click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("image", type=FILE)
-@click.argument("svg", type=FILE)
+@click.argument("image", type=INPUT)
+@click.argument("svg", type=INPUT)
 @hook_options("eval")
 @overwrite_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -30,22 +30,26 @@ def command(image: Path, svg: Path, **given: Any) -> None:
     """
     import warpsplat
     from warpsplat.files.inputs import STANDARD, read_input
+    from warpsplat.files.output import SVG_ENDINGS
+    from warpsplat.files.remote import is_remote
 
     if image == svg == STANDARD:
         raise UsageError("only one of image and SVG can come from the standard input")
+    if image.suffix.lower() in SVG_ENDINGS:
+        raise UsageError(f"{image}: is an SVG; eval takes the image first, then the SVG")
     hooks, request = Hooks("eval", given), Request.taken(image, given)
     hooks.check([image, svg], [], overwrite=request.overwrite)
-    # The standard input can be read once.
-    shown = read_input(image) if image == STANDARD else image
-    text = read_input(svg, "an SVG") if svg == STANDARD else svg
+    # The standard input can be read once, and a URL should be.
+    shown = read_input(image) if image == STANDARD or is_remote(image) else image
+    text = read_input(svg, "an SVG") if svg == STANDARD or is_remote(svg) else svg
     values = warpsplat.score(text, shown).as_dict()
     hooks.finish(Done(request, shown, [(svg, text)]))
     if request.as_json:
         echo(json.dumps({"image": str(image), "svg": str(svg), **values, **hooks.as_dict()}))
         return
     for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
-        unit = " dB" if name == "psnr" else ""
-        value = "-" if values[name] is None else values[name]
-        echo(f"{name:12}{value}{unit if values[name] is not None else ''}")
+        value = f"{values[name]} dB" if name == "psnr" else values[name]
+        missing = "exact" if name == "psnr" else "-"
+        echo(f"{name:12}{missing if values[name] is None else value}")
     echo(f"{'bytes':12}{values['bytes']}")
     echo(f"{'gzip_bytes':12}{values['gzip_bytes']}")

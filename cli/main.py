@@ -10,6 +10,7 @@ import itertools
 import json
 import os
 import re
+import shlex
 import signal
 import sys
 import traceback
@@ -20,8 +21,9 @@ import click
 from warpsplat._version import __version__
 from warpsplat.cli.echo import echo, notices, open_standard_streams, silence
 from warpsplat.cli.signals import Interrupt, handled, leave_compiler
-from warpsplat.errors import LONGEST_MESSAGE, ExitCode, OutputError, cut, explain, printable
+from warpsplat.errors import LONGEST_MESSAGE, ExitCode, ImageError, OutputError, cut, explain, printable
 from warpsplat.extensions import Command, declared, load
+from warpsplat.files.remote import is_url
 
 COMMANDS: dict[str, Command] = {
     "vectorize": Command("Turn an image into an SVG.", "warpsplat.cli.vectorize:command"),
@@ -36,7 +38,7 @@ COMMANDS: dict[str, Command] = {
 GARBAGE = 500_000
 """Objects that are made, over those that are freed, before Python looks for cycles."""
 
-FOR_SVG = ("render FILE.svg -o FILE.png", "refine FILE.svg IMAGE -o BETTER.svg", "eval IMAGE FILE.svg")
+FOR_SVG = ("render FILE.svg", "refine FILE.svg IMAGE", "eval IMAGE FILE.svg")
 FOR_YAML = ("batch FILE.yaml",)
 FOR_FILES = {".svg": FOR_SVG, ".svgz": FOR_SVG, ".yaml": FOR_YAML, ".yml": FOR_YAML}
 """Commands for files that are not images."""
@@ -56,15 +58,20 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command and its arguments; an existing file in place of a command is vectorized.
+        """Return the command and its arguments; an image in place of a command is vectorized.
 
         Raises:
             click.UsageError: an unknown command; the message suggests one.
+            ImageError: a missing file.
         """
         name = args[0]
         if name in COMMANDS or ctx.resilient_parsing:
             return super().resolve_command(ctx, args)
-        if not os.path.isfile(name):
+        if os.path.isdir(name) and "batch" in COMMANDS:
+            ctx.fail(f"{name}: is a folder; warpsplat batch {shlex.quote(name)} vectorizes its images")
+        if not os.path.isfile(name) and not is_url(name):
+            if os.path.splitext(name)[1] or os.path.basename(name) != name:
+                raise ImageError(f"{name}: no such file")
             found = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"; did you mean {found[0]}?" if found else "; commands are " + ", ".join(COMMANDS)
             ctx.fail(f"no such command or file: {name}{hint}")
@@ -169,6 +176,19 @@ def report_error(error: BaseException, objects: Literal["stdout", "stderr"] | No
     return code
 
 
+NUMBERS = {"integer": "a whole number", "float": "a number"}
+NUMBER = re.compile("a valid (integer|float)(?: range)?")
+"""What click calls numbers."""
+
+
+def hint_for(flag: str) -> str:
+    """Return what messages add about an option without its value."""
+    from warpsplat.run.options import BY_NAME
+
+    option = BY_NAME.get(flag.lstrip("-"))
+    return option.hint if option else ""
+
+
 QUOTED = re.compile(r"""(["'])([^"']*)\1""")
 """Values in click's messages."""
 
@@ -187,7 +207,10 @@ def message_of(error: BaseException) -> tuple[str, int]:
         if isinstance(error, click.NoSuchOption) and context and context.command is cli:
             help_of = " (options follow a command: warpsplat vectorize IMAGE ...)"
         message = " ".join(error.format_message().split())
+        if isinstance(error, click.BadOptionUsage):
+            message = message.rstrip(".") + hint_for(error.option_name)
         if isinstance(error, click.BadParameter):
+            message = NUMBER.sub(lambda found: NUMBERS[found[1]], message)
             message = QUOTED.sub(lambda found: f"{found[1]}{cut(found[2])}{found[1]}", message)
         return printable(cut(message, LONGEST_MESSAGE)) + help_of, error.exit_code
     return explain(error)

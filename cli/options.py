@@ -13,14 +13,34 @@ import click
 from warpsplat.cli.echo import set_verbosity
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD, input_name
+from warpsplat.files.remote import is_url, path_of
 from warpsplat.fit.options import Option
 from warpsplat.run.options import OPTIONS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-FILE: click.Path = click.Path(path_type=Path, readable=False)
-"""A file name. The command itself checks whether it can be read, for the right exit code."""
+class InputFile(click.Path):
+    """The path or URL of a file. The command checks whether it can be read, for the right exit code."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path; raise ``UsageError`` for a URL without the package that reads it."""
+        if value == "":
+            self.fail("the name of the file is empty", param, ctx)
+        return path_of(value)
+
+
+class OutputFile(click.Path):
+    """The path of a file to write, on this machine."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path; raise ``click.BadParameter`` for a URL."""
+        if is_url(str(value)):
+            self.fail(f"{value}: only warpsplat batch writes to URLs", param, ctx)
+        return Path(value)
+
+
+INPUT, OUTPUT = InputFile(), OutputFile()
 
 threads_option = click.option(
     "--threads",
@@ -31,7 +51,7 @@ threads_option = click.option(
 
 importance_option = click.option(
     "--importance",
-    type=FILE,
+    type=INPUT,
     metavar="MASK",
     help="Image of the same proportions: errors count most where it is white, least where it is black.",
 )
@@ -55,7 +75,7 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
 checkpoint_options = together(
     click.option(
         "--checkpoint",
-        type=FILE,
+        type=OUTPUT,
         metavar="FILE",
         help="Save the state of the run in FILE, which is removed when the run is done.",
     ),
@@ -76,13 +96,17 @@ checkpoint_options = together(
 
 def _set_verbosity(context: click.Context, parameter: click.Parameter, value: int | bool) -> int | bool:
     if value:
+        if context.params.get("verbose" if parameter.name == "quiet" else "quiet"):
+            raise UsageError("-q and -v cannot be combined")
         set_verbosity(quiet=parameter.name == "quiet")
     return value
 
 
+quiet_option = click.option("-q", "--quiet", is_flag=True, callback=_set_verbosity, help="Print errors only.")
+
 verbosity_options = together(
     click.option("-v", "--verbose", count=True, callback=_set_verbosity, help="Print more, on stderr."),
-    click.option("-q", "--quiet", is_flag=True, callback=_set_verbosity, help="Print errors only."),
+    quiet_option,
 )
 
 run_options = together(
@@ -169,6 +193,16 @@ class Request:
         """Take the values of the options out of those of a command."""
         names = [field.name for field in fields(cls) if field.name in given]
         return cls(image, **{name: given.pop(name) for name in names})
+
+    def output_for(self, source: Path, ending: str) -> Path:
+        """Return the output, or the name of ``source`` with another ending, in the current folder.
+
+        Raises:
+            UsageError: there is no output, and the source is the standard input.
+        """
+        if self.output is None and source == STANDARD:
+            raise UsageError(f"the standard input has no name: give -o FILE{ending}, or -o -")
+        return self.output or Path(f"{Path(source.name).stem}{ending}")
 
     @property
     def inputs(self) -> tuple[Path, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import click
 
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
-    FILE,
+    INPUT,
+    OUTPUT,
     Request,
     checkpoint_options,
     overwrite_option,
@@ -18,18 +20,18 @@ from warpsplat.cli.options import (
 )
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
+from warpsplat.files.remote import is_remote
 from warpsplat.fit.settings import make_settings
 
 
 @click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("svg", type=FILE)
-@click.argument("image", type=FILE)
+@click.argument("svg", type=INPUT)
+@click.argument("image", type=INPUT)
 @click.option(
     "-o",
     "--output",
-    type=FILE,
-    required=True,
-    help="SVG to write, or .svgz, .png, .pdf; - is the standard output.",
+    type=OUTPUT,
+    help="SVG to write, or .svgz, .png, .pdf; - is the standard output.  [default: SVG-refined.svg, here]",
 )
 @overwrite_option
 @click.option(
@@ -56,7 +58,6 @@ from warpsplat.fit.settings import make_settings
 def command(
     svg: Path,
     image: Path,
-    output: Path,
     checkpoint: Path | None,
     resume: bool,
     checkpoint_every: str,
@@ -74,13 +75,15 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
+    output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_exceptions, finish, watched
+    from warpsplat.cli.run import decibels, echo_exceptions, finish, watched
     from warpsplat.run.refine import refine
+    from warpsplat.run.result import finite
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
-    shown = read_input(image) if hooks.need_image() else image
+    shown = read_input(image) if hooks.need_image() or is_remote(image) else image
     with watched(request, svg) as (report, stop):
         result = refine(
             data,
@@ -98,15 +101,15 @@ def command(
             checkpoint_every=checkpoint_every,
             overwrite=request.overwrite,
         )
-        hooks.show(result, None if image == STANDARD else image)
-    before = result.before or 0.0
+        hooks.show(result, None if image == STANDARD else shown)
+    before = math.inf if result.before is None else result.before
     if not request.quiet:
         echo_exceptions(input_name(svg), result)
-    values = {"svg": str(svg), "output": str(output), "psnr_before": round(before, 3), **result.as_dict()}
+    values = {"svg": str(svg), "output": str(output), "psnr_before": finite(before), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
     from warpsplat.run.command_line import refine_command
 
     line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
     done = Done(request, shown, [(output, result)], line)
-    finish(done, hooks, values, note=f" (before: {before:.2f} dB)", aside=output == STANDARD)
+    finish(done, hooks, values, note=f" (before: {decibels(finite(before))})", aside=output == STANDARD)

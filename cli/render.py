@@ -7,19 +7,19 @@ from typing import Any
 
 import click
 
-from warpsplat.cli.options import FILE, overwrite_option, threads_option
+from warpsplat.cli.echo import echo
+from warpsplat.cli.options import INPUT, OUTPUT, Request, overwrite_option, quiet_option, threads_option
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.extensions import renderer_names
 
 
 @click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("svg", type=FILE)
+@click.argument("svg", type=INPUT)
 @click.option(
     "-o",
     "--output",
-    type=FILE,
-    required=True,
-    help="PNG to write, or .pdf; - is the standard output, for a PNG.",
+    type=OUTPUT,
+    help="PNG to write, or .pdf; - is the standard output, for a PNG.  [default: SVG with .png, here]",
 )
 @overwrite_option
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
@@ -37,9 +37,8 @@ from warpsplat.extensions import renderer_names
     help="For exact and splat: auto (a GPU if there is one), cpu, or cuda:N.",
 )
 @threads_option
-def command(
-    svg: Path, output: Path, overwrite: bool, scale: float, renderer: Any, device: str, threads: int | None
-) -> None:
+@quiet_option
+def command(svg: Path, scale: float, renderer: Any, **given: Any) -> None:
     """Convert any SVG to a PNG, or its paths to a PDF; - is the standard input."""
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
@@ -50,7 +49,9 @@ def command(
     from warpsplat.svg.viewer import draw_png
 
     check_draws_files(renderer)
-    check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=overwrite)
+    request = Request.taken(svg, given)
+    output = request.output_for(svg, ".png")
+    check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=request.overwrite)
     check_format(output)
     if renderer != "viewer" and output.suffix.lower() == ".pdf":
         raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
@@ -60,6 +61,7 @@ def command(
         if renderer != "viewer":
             from warpsplat.run.render import render
 
+            device, threads = request.device, request.threads
             png = to_png(render(text, scale=scale, renderer=renderer, device=device, threads=threads))
             write_result(output, mark_png(png))
         elif output == STANDARD:
@@ -68,3 +70,5 @@ def command(
             write_named(output, text, zoom=scale)
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
+    if not request.quiet and output != STANDARD:
+        echo(f"{output}: {output.stat().st_size / 1000:.1f} kB")

@@ -17,7 +17,7 @@ from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks
 from warpsplat.cli.options import Request
 from warpsplat.cli.signals import Interrupt
-from warpsplat.errors import ExitCode, printable
+from warpsplat.errors import ExitCode, counted, printable
 from warpsplat.extensions import load_renderer
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.progress import Progress, TimeLeft
@@ -28,7 +28,12 @@ from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
 
-SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "picture of cells"}
+SUBJECTS = {
+    "photo": "photograph",
+    "drawing": "drawing",
+    "line": "line drawing",
+    "pixel": "piece of pixel art",
+}
 """Subjects as messages call them."""
 
 BAR_LENGTH = 1000
@@ -113,7 +118,8 @@ def requested(settings: Settings) -> str:
     number = f"{'at most ' if settings.simplify or has_goal else ''}{settings.curves}"
     if settings.simplify and has_goal:
         number = "no more than needed"
-    return f"{number} {'fills and strokes' if settings.mixed else PLURALS[settings.kind]}"
+    kind = "fills and strokes" if settings.mixed else PLURALS[settings.kind]
+    return f"{number} {kind.removesuffix('s') if number == '1' else kind}"
 
 
 def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int) -> None:
@@ -124,14 +130,14 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
         echo(f"warpsplat: {name}: taken for a {SUBJECTS[result.subject]}: {result.why}{other}", err=True)
     has_goal = settings.target_psnr or settings.max_bytes
     if not traced and settings.simplify and not has_goal and count < settings.curves:
-        hint = f"a simple image: {count} shapes; --curves N for another number"
+        hint = f"a simple image: {counted(count, 'shape')}; --curves N for another number"
         echo(f"warpsplat: {name}: {hint}", err=True)
     echo_exceptions(name, result)
 
 
 def echo_exceptions(name: str, result: Result) -> None:
     """Print which elements were kept, how the image was reduced, and how many shapes were reset, if any."""
-    reset = f"shapes had numbers that are not finite, {result.renewed} times; these were reset"
+    reset = f"shapes with numbers that are not finite were reset, {counted(result.renewed, 'time')}"
     notes = (result.kept and f"kept as it is: {result.kept}", result.reduced, result.renewed and reset)
     for note in filter(None, notes):
         echo(f"warpsplat: {name}: {note}", err=True)
@@ -160,7 +166,7 @@ def summary(output: Path, values: dict[str, Any]) -> str:
     from warpsplat.run.formats import PICTURE_ENDINGS
 
     name = "standard output" if str(output) == "-" else printable(str(output))
-    note = f", stopped after {values['iterations']} iterations" if values["stopped"] else ""
+    note = f", stopped after {counted(values['iterations'], 'iteration')}" if values["stopped"] else ""
     picture = " as an SVG" if output.suffix.lower() in PICTURE_ENDINGS else ""
     if values["paths"] is None:
         size = f"{values['bytes'] / 1000:.1f} kB{picture}"
@@ -174,17 +180,20 @@ def summary(output: Path, values: dict[str, Any]) -> str:
         )
         if values[key] is not None
     )
-    psnr = _decibels(values["psnr"])
+    psnr = decibels(values["psnr"])
     if load_renderer(values["renderer"]).soft:
         psnr = f"the soft render {values['render_psnr']:.2f} dB, the file {psnr}"
-    levels = ", ".join(f"{each['shapes']} shapes {_decibels(each['psnr'])}" for each in values["levels"][:-1])
+    levels = ", ".join(
+        f"{counted(each['shapes'], 'shape')} {decibels(each['psnr'])}" for each in values["levels"][:-1]
+    )
     note += f"; the first {levels}" if levels else ""
     return (
-        f"{name}: {psnr}{similar}, {values['paths']} paths, {values['nodes']} nodes, "
+        f"{name}: {psnr}{similar}, {counted(values['paths'], 'path')}, {counted(values['nodes'], 'node')}, "
         f"{values['bytes'] / 1000:.1f} kB ({values['gzip_bytes'] / 1000:.1f} kB gzipped){picture}, "
         f"{values['seconds']:.1f} s{note}"
     )
 
 
-def _decibels(psnr: float | None) -> str:
+def decibels(psnr: float | None) -> str:
+    """Return a PSNR of ``Result.as_dict`` as text."""
     return "exact" if psnr is None else f"{psnr:.2f} dB"

@@ -57,10 +57,9 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
     if not request.quiet and results:
         echo_notes(image, settings, results[-1], verbose=request.verbose)
     left = ", ".join(str(number) for number in numbers if number not in begun)
-    missing = f"interrupted: no file with {left} shapes" if left else ""
+    missing = f"interrupted: no file for --curves {left}" if left else ""
     if request.as_json:
-        device = request.device
-        each = [{"image": str(image), "output": str(p), "device": device, **r.as_dict()} for p, r in made]
+        each = [{"image": str(image), "output": str(p), **r.as_dict()} for p, r in made]
         echo(json.dumps(each))
         if missing:
             echo(f"warpsplat: {missing}", err=True)
@@ -110,7 +109,7 @@ def table(made: Sequence[tuple[Path, Result]]) -> str:
         values = result.as_dict()
         rows.append([printable(str(path))])
         for _, name, digits, factor in COLUMNS:
-            missing = "exact" if name == "psnr" and values["paths"] is not None else "-"
+            missing = "exact" if name == "psnr" and values["exact"] else "-"
             rows[-1].append(missing if values[name] is None else f"{factor * values[name]:.{digits}f}")
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows]

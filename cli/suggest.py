@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, counted
 
 if TYPE_CHECKING:
     from warpsplat.cli.options import Request
@@ -35,7 +35,7 @@ def suggest_number(request: Request, given: dict[str, Any]) -> None:
     if request.output:
         raise UsageError(NOTHING_ELSE)
     if given["curves"] is not None:
-        raise UsageError("--suggest and --curves do not go together")
+        raise UsageError("--suggest and --curves cannot be combined")
     from warpsplat.cli.run import watched
     from warpsplat.files.inputs import STANDARD, input_name, read_input
     from warpsplat.run.command_line import vectorize_command
@@ -63,7 +63,7 @@ def _lines(name: str, made: Suggestion) -> list[str]:
     """Return a suggestion as text."""
     if made.curves is None:
         return [f"{name}: {made.why}"]
-    lines = [f"{name}: {made.curves} shapes", "    shapes     dB      kB   twice as many buy"]
+    lines = [f"{name}: {counted(made.curves, 'shape')}", "    shapes     dB      kB   twice as many buy"]
     for i, one in enumerate(made.expected):
         more = made.expected[i + 1] if i + 1 < len(made.expected) else None
         buys = ""

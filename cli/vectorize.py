@@ -10,7 +10,8 @@ import click
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
-    FILE,
+    INPUT,
+    OUTPUT,
     Request,
     checkpoint_options,
     importance_option,
@@ -21,15 +22,15 @@ from warpsplat.cli.options import (
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.errors import UsageError
 from warpsplat.extensions import declared, load
-from warpsplat.run.options import settings_from
+from warpsplat.run.options import settings_from, with_preset
 
 
 @click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("images", type=FILE, nargs=-1, required=True, metavar="IMAGE...")
+@click.argument("images", type=INPUT, nargs=-1, required=True, metavar="IMAGE...")
 @click.option(
     "-o",
     "--output",
-    type=FILE,
+    type=OUTPUT,
     help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder, of several numbers of"
     " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
@@ -68,11 +69,7 @@ def command(
     of shapes (--curves 50,200,1000) make a file each, and share work.
     """
     hooks = Hooks("vectorize", given)
-    if preset is not None:
-        with_preset = declared("provides").get("with_preset")
-        if with_preset is None:
-            raise UsageError("presets need the extension batch, which is not installed")
-        given = load(with_preset)(preset, given)
+    given = with_preset(preset, given)
     numbers = given["curves"] if isinstance(given["curves"], tuple) else ()
     request = Request.taken(images[0], given)
     if suggest:
@@ -97,7 +94,7 @@ def command(
         hooks.check_mode("several numbers")
         if as_uri or checkpoint or resume:
             flag = "--data-uri" if as_uri else "--checkpoint" if checkpoint else "--resume"
-            raise UsageError(f"several numbers of shapes and {flag} do not go together")
+            raise UsageError(f"several numbers of shapes and {flag} cannot be combined")
         from warpsplat.cli.several import make_several
 
         make_several(request, numbers, given, hooks)
@@ -116,12 +113,10 @@ def single(
     from warpsplat.files.inputs import STANDARD, read_input
 
     settings, image = settings_from(given), request.image
-    if request.output is None and image == STANDARD:
-        raise UsageError("an image from the standard input has no name: give -o FILE.svg, or -o -")
+    output = request.output_for(image, ".svg")
     if as_uri and request.output == STANDARD:
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
     inputs, data = request.inputs, read_input(image)
-    output = request.output or Path(image.name).with_suffix(".svg")
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
     from warpsplat.cli.run import echo_notes, finish, requested, watched
     from warpsplat.run.command_line import vectorize_command
@@ -145,7 +140,7 @@ def single(
         from warpsplat.svg.numbers import data_uri
 
         echo(data_uri(result.svg))
-    values = {"image": str(image), "output": str(output), "device": request.device, **result.as_dict()}
+    values = {"image": str(image), "output": str(output), **result.as_dict()}
     line = vectorize_command(settings, str(image), str(output), *request.flags)
     done = Done(request, data, [(output, result)], line)
     finish(done, hooks, values, aside=as_uri or output == STANDARD)

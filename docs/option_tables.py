@@ -35,6 +35,7 @@ class Options(RefineOptions, total=False):
     The documentation's table explains them.
     """
 
+    preset: str | None
 %s'''
 
 
@@ -53,7 +54,7 @@ def annotation(option: Option) -> str:
         return "LossName | LossFunction | CustomLoss"
     written = {**Settings.__annotations__, **make_settings.__annotations__}.get(option.keyword, "bool")
     written = written.removesuffix(" | None").replace("tuple[", "Sequence[").replace(", ...]", "]")
-    return f"{written} | str" if option.parse else written
+    return f"{written} | str" if option.parse and written != "str" else written
 
 
 def table(name: str) -> str:

@@ -170,3 +170,49 @@ def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
     for path in tmp_path.iterdir():
         drawn, committed = (render_svg(each.read_text("utf-8")) for each in (path, kept / path.name))
         assert drawn.size == committed.size
+
+
+OTHERS = {"pydiffvg.md"}
+"""Pages that name the files of other programs."""
+
+IMAGINED = "warpsplat/palette/"
+"""The extension that CONTRIBUTING.md has readers write."""
+
+REMOVED = re.compile(r"`[^`\n]+` \(since removed\)")
+"""How the history of docs/experiments.md names what is gone."""
+
+SOURCES = {
+    path.relative_to(ROOT).as_posix(): path
+    for folder in ("warpsplat", "cli", "kernels", "tests", "docs", "examples")
+    for path in (ROOT / folder).rglob("*.py")
+}
+
+PACKAGES = {"torch", "pydiffvg"}
+"""Folders that have the names of other packages."""
+
+FOLDERS = "|".join({path.name for path in (ROOT / "warpsplat").iterdir() if path.is_dir()} - PACKAGES)
+
+
+def defines(name: str) -> bool:
+    """Whether ``fit.rounding.freeze_stage`` is a module of warpsplat, or a name in one."""
+    folder, *rest = name.split(".")
+    for end in range(len(rest), -1, -1):
+        stem = "/".join(("warpsplat", folder, *rest[:end]))
+        if file := SOURCES.get(f"{stem}.py") or SOURCES.get(f"{stem}/__init__.py"):
+            text = file.read_text("utf-8")
+            return all(re.search(rf"\b(def|class) {one}\b|\b{one}\b.* = ", text) for one in rest[end:])
+    return False
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_pages_name_is_there(page: Path) -> None:
+    """Source files, modules and names in them, and commands of the tests."""
+    text = REMOVED.sub("", re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL))
+    for file in re.findall(r"`([\w/]+\.py)\b[^`\n]*`", text) if page.name not in OTHERS else ():
+        known = file.startswith(IMAGINED) or any(f"/{each}".endswith(f"/{file}") for each in SOURCES)
+        assert known, file
+    for name in re.findall(rf"`((?:{FOLDERS})(?:\.\w+)+)`", text):
+        assert name.endswith(".py") or defines(name), name
+    for module in re.findall(r"python -m (tests(?:\.\w+)*)", page.read_text("utf-8")):
+        stem = module.replace(".", "/")
+        assert {f"{stem}.py", f"{stem}/__main__.py"} & {*SOURCES}, module

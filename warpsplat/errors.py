@@ -131,6 +131,11 @@ def cause_of(error: BaseException) -> str:
     return next(iter(str(error).strip().splitlines()), type(error).__name__)
 
 
+def counted(number: int, word: str) -> str:
+    """Return ``1 path`` or ``2 paths``."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
 def printable(text: str) -> str:
     """Return ``text`` on one line, with control characters and undecodable bytes of names escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

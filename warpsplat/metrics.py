@@ -164,7 +164,7 @@ class Score:
     """Figures of a file compared with its image."""
 
     psnr: float
-    """Peak signal-to-noise ratio [dB]."""
+    """Peak signal-to-noise ratio [dB]; infinite if the file shows the very image."""
     ssim: float | None
     """Structural similarity, at most 1; None: the image is too small."""
     ms_ssim: float | None
@@ -187,9 +187,10 @@ class Score:
         return replace(self, **_sizes(text))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures for JSON, rounded to their accuracy."""
+        """Return the figures for JSON, rounded to their accuracy; an infinite PSNR is None."""
         values = asdict(self)
-        values["psnr"] = round(self.psnr, 3) if np.isfinite(self.psnr) else None
+        values["exact"] = bool(np.isposinf(self.psnr))
+        values["psnr"] = None if values["exact"] else round(self.psnr, 3)
         for name in ("ssim", "ms_ssim"):
             values[name] = None if values[name] is None else round(values[name], 4)
         values["ssimulacra2"] = None if self.ssimulacra2 is None else round(self.ssimulacra2, 2)

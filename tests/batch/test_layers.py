@@ -104,11 +104,11 @@ def test_names_of_results(folder: Path, output: str, made: str) -> None:
         ("rates.pints=3", "unknown key 'rates.pints'"),
         ("curves.x=3", "unknown key 'curves.x'"),
         ("curves=0", "--set curves=0: "),
-        ("curves=[", "no plain value"),
+        ("curves=[", "is not plain YAML"),
         ("curves=", "has no value"),
         ("rates.points=x", "rates"),
         ("open=false", "must be true"),
-        ("curves=!!python/object:os.system x", "no plain value"),
+        ("curves=!!python/object:os.system x", "is not plain YAML"),
     ],
 )
 def test_what_cannot_be_set(text: str, words: str) -> None:
@@ -180,4 +180,4 @@ def test_shards_are_parts_whatever_the_list(folder: Path) -> None:
 @pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "-1/3"])
 def test_what_is_no_shard(folder: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
     assert run("batch", folder / "in", "--shard", text) == 2
-    assert "is no I/N" in capsys.readouterr().err
+    assert "is not of the form I/N" in capsys.readouterr().err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import warpsplat
@@ -12,7 +13,7 @@ from tests.cli.helpers import one_line, run
 from warpsplat.batch.presets import FOLDER, load_preset, preset_names, with_preset
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
-from warpsplat.scene import Kind
+from warpsplat.scene import Basis, Kind
 
 NAMES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
 
@@ -66,3 +67,17 @@ def test_from_python() -> None:
     assert warpsplat.load_preset("low-poly")["shape"] == "triangle"
     with pytest.raises(UsageError, match="there is no preset 'oil'"):
         warpsplat.load_preset("oil")
+
+
+def test_options_over_a_preset_from_python() -> None:
+    """As on the command line."""
+    pixels = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    result = warpsplat.vectorize(pixels, preset="low-poly", curves=5, iterations=2, device="cpu")
+    assert len(result.scene) == 5
+    assert all(basis == Basis.POLYGON for basis in result.scene.basis)
+    with pytest.raises(UsageError, match="there is no preset 'oil'"):
+        warpsplat.vectorize(pixels, preset="oil")
+    with pytest.raises(UsageError, match="settings are given, and preset as well"):
+        warpsplat.vectorize(pixels, preset="ink", settings=warpsplat.make_settings())
+    both = warpsplat.vectorize_several(pixels, [3, 5], preset="low-poly", iterations=2, device="cpu")
+    assert [len(one.scene) for one in both] == [3, 5]

@@ -6,10 +6,12 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from tests.cli.helpers import one_line, run
+from tests.fuzz.corpus import own_svg
 from tests.svg.foreign import FOREIGN, HEAD
 
 
@@ -70,3 +72,15 @@ def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         values = json.loads(capsys.readouterr().out)
         assert values["psnr"] > values["psnr_before"]
         assert ("#fe0" in output.read_text()) == has_one
+
+
+def test_a_name_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("in").mkdir()
+    Path("in/a.svg").write_bytes(own_svg("fill"))
+    Image.fromarray(np.full((24, 32, 3), 200, np.uint8)).save("a.png")
+    words = ("refine", "in/a.svg", "a.png", "--iterations", 1, "--device", "cpu", "-q")
+    assert run(*words) == 0
+    assert Path("a-refined.svg").exists() and not Path("in/a-refined.svg").exists()
+    Path("a-refined.svg").write_text("<svg/>")
+    assert run(*words) == 2, "another's file"

@@ -30,6 +30,11 @@ WITH_DEVICE = ("vectorize", "refine", "batch", "bench", "serve")
 OPTIMISING = ("vectorize photo.png", "refine drawing.svg photo.png")
 
 USAGE = [
+    *[
+        (f"vectorize photo.png {option}", "quotes, as an unquoted # begins a comment")
+        for option in ("--background ''", "--palette ''", "--palette '#ff'")
+    ],
+    ("folder.svg", "folder.svg: is a folder; warpsplat batch folder.svg vectorizes its images"),
     ("nonsense", "no such command or file: nonsense; commands are vectorize, "),
     ("vectorise photo.png", "no such command or file: vectorise; did you mean vectorize?"),
     ("drawing.svg", "drawing.svg: with which command? warpsplat render FILE.svg"),
@@ -38,7 +43,7 @@ USAGE = [
     ("vectorize photo.png --curve 5", "--curves"),
     *[(f"{line} --nonsense", "--nonsense") for line in VALID.values()],
     *[(f"{VALID[name]} --device cuda:99", "cuda:99") for name in WITH_DEVICE],
-    *[(line, "issing") for line in ("compare", "vectorize", "refine drawing.svg photo.png")],
+    *[(line, "issing") for line in ("compare", "vectorize", "refine drawing.svg")],
     ("vectorize photo.png --device tpu", "tpu"),
     # Values
     ("vectorize photo.png --curves 0", "curves"),
@@ -55,6 +60,9 @@ USAGE = [
     ("vectorize missing.png --units ell", "units must be one of"),
     ("refine drawing.svg photo.png -o a.svg --iterations 0", "iterations"),
     ("refine drawing.svg photo.png -o a.svg --background yellow", "background"),
+    ("vectorize ''", "the name of the file is empty"),
+    ("eval drawing.svg photo.png", "eval takes the image first, then the SVG"),
+    *[(f"vectorize photo.png {option} many", "is not a whole number") for option in ("--threads", "--seed")],
     *[(f"{VALID['render']} --scale {scale}", "scale") for scale in ("0", "-1", "nan", "1e9", "1e308")],
     ("render good.svg -o a.png --scale 1e-9", "scale"),
     ("render many.svg -o a.png --scale 2", "scale 2.0 makes"),
@@ -81,7 +89,15 @@ USAGE = [
     ("vectorize photo.png -o /dev/null", "is a device"),
     ("vectorize photo.png -o loop.svg", "loop.svg"),
     (f"vectorize photo.png -o {300 * 'x'}.svg", "xxx"),
-    ("vectorize - --curves 4", "give -o"),
+    ("vectorize - --curves 4", "give -o FILE.svg"),
+    ("refine - photo.png", "give -o FILE-refined.svg"),
+    ("render -", "give -o FILE.png"),
+    *[
+        (f"vectorize photo.png {flags}", "-q and -v cannot be combined")
+        for flags in ("-q -v", "-v -q", "-vvq")
+    ],
+    ("batch photo.png -q -v", "-q and -v cannot be combined"),
+    ("render foreign-9.svg", "foreign-9.png: exists and was not written"),
     ("vectorize - -o a.svg --importance -", "image and mask"),
     ("vectorize photo.png -o - --data-uri", ""),
     ("refine - - -o b.svg", ""),
@@ -103,16 +119,19 @@ USAGE = [
     ("vectorize photo.png --curves 5,9 -o photo.png/{curves}.svg", "photo.png is a file, not a folder"),
     ("vectorize photo.png --curves 3,9 -o foreign-{curves}.svg", "foreign-9.svg: exists and was not written"),
     *[
-        (f"vectorize photo.png --curves 8,9 --{option}", f"and {option.split()[0]} do not go together")
+        (f"vectorize photo.png --curves 8,9 --{option}", f"and {option.split()[0]} cannot be combined")
         for option in ("target-psnr 20", "max-bytes 2KB", "time-budget 9s")
     ],
-    ("vectorize photo.png --curves 8,9 --layered", "and levels do not go together"),
-    ("vectorize photo.png --curves 5,9 --checkpoint a.ckpt", "and --checkpoint do not go together"),
-    ("vectorize photo.png --curves 5,9 --data-uri", "and --data-uri do not go together"),
+    ("vectorize photo.png --curves 8,9 --layered", "and levels cannot be combined"),
+    ("vectorize photo.png --curves 5,9 --checkpoint a.ckpt", "and --checkpoint cannot be combined"),
+    ("vectorize photo.png --curves 5,9 --data-uri", "and --data-uri cannot be combined"),
     ("vectorize photo.png --curves 5,9 --animate a.gif", "--animate takes one number of shapes"),
-    ("vectorize photo.png --curves 5,9 --subject pixel -o new/", "photo.png: a picture of cells has"),
+    (
+        "vectorize photo.png --curves 5,9 --subject pixel -o new/",
+        "how many shapes a piece of pixel art has",
+    ),
     ("vectorize photo.png --curves 5,9 photo.png", "matrix: {curves: [5, 9]}"),
-    ("vectorize photo.png --suggest --curves 5", "--suggest and --curves do not go together"),
+    ("vectorize photo.png --suggest --curves 5", "--suggest and --curves cannot be combined"),
     ("vectorize photo.png --suggest --max-bytes 5KB", "suggest and max-bytes both"),
     ("vectorize photo.png --suggest -o a.svg", "writes nothing"),
     # Batches
@@ -137,8 +156,10 @@ INPUT = [
         for name in ("none.svg", "broken.png", "binary.svg")
     ],
     ("eval photo.png photo.png", "warpsplat: photo.png: not an SVG"),
-    ("vectorize .", ""),
-    ("vectorize ''", ""),
+    ("none.png", "none.png: no such file"),
+    ("none.svg", "none.svg: no such file"),
+    ("none/photo", "none/photo: no such file"),
+    ("vectorize .", "is a folder, not an image; warpsplat batch takes folders"),
     ("vectorize folder.svg", "folder.svg"),
     ("render . -o a.png", ""),
     ("render many.svg -o a.png", "many.svg: has more than 200 million pixels"),
@@ -192,7 +213,7 @@ FILES = {
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("inputs")
     pixels = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
-    for name in ("photo.png", "foreign.png"):
+    for name in ("photo.png", "foreign.png", "foreign-9.png"):
         Image.fromarray(pixels).save(path / name)
     for name, data in FILES.items():
         (path / name).write_bytes(data)
@@ -240,3 +261,10 @@ def test_a_refused_value_is_shown_by_its_beginning(option: str, capsys: pytest.C
     assert run("vectorize", "a.png", option, 5000 * "9") == 2
     said = one_line(capsys.readouterr().err)
     assert 70 * "9" in said and 90 * "9" not in said
+
+
+@pytest.mark.parametrize("option", ["--background", "--palette"])
+def test_a_colour_that_the_shell_took_for_a_comment(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("vectorize", "a.png", option) == 2
+    said = one_line(capsys.readouterr().err)
+    assert f"'{option}' requires an argument; write it in quotes" in said

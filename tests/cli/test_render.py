@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import QUICK, run
+from tests.fuzz.corpus import own_svg
 from tests.svg.foreign import HEAD, PATH, SMALL
 from warpsplat.metrics import psnr
 
@@ -18,7 +19,7 @@ from warpsplat.metrics import psnr
 def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     svg, png = tmp_path / "a.svg", tmp_path / "a.png"
     assert run("vectorize", image, "-o", svg, "-q", *QUICK) == 0
-    assert run("render", svg, "-o", png, "--scale", "2.5") == 0
+    assert run("render", svg, "-o", png, "--scale", "2.5", "-q") == 0
     with Image.open(png) as picture:
         assert picture.size == (150, 100)
     assert capsys.readouterr() == ("", "")
@@ -96,3 +97,16 @@ def test_standard_streams(
     assert run("render", "-", "-o", "-") == 3
     assert b"standard input" in capsysbinary.readouterr().err
     assert run("eval", "-", "-") == 2
+
+
+def test_a_name_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without -o a PNG here, and one line about it, which -q leaves out."""
+    monkeypatch.chdir(tmp_path)
+    Path("in").mkdir()
+    Path("in/a.svg").write_bytes(own_svg("fill"))
+    assert run("render", "in/a.svg") == 0
+    assert capsys.readouterr().out == f"a.png: {Path('a.png').stat().st_size / 1000:.1f} kB\n"
+    assert run("render", "in/a.svg", "-q") == 0
+    assert capsys.readouterr().out == ""

@@ -160,7 +160,7 @@ def test_nan_and_infinite_pixels_are_refused(tmp_path: Path, bad: float, count: 
     samples = np.zeros(63, np.float32)
     samples[:count] = bad
     path = save(tmp_path, Image.fromarray(samples.reshape(7, 9)), "a.tif")
-    with pytest.raises(ImageError, match=rf"^{path}: {count} of 63 pixels are no numbers"):
+    with pytest.raises(ImageError, match=rf"^{path}: {count} of 63 pixels are not finite numbers"):
         load_image(path)
 
 
@@ -217,5 +217,5 @@ def test_float_maps_are_of_0_to_1_and_of_numbers(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_image(path)[..., 0], grey)
     grey[1, 2] = np.nan
     path.write_bytes(b"Pf\n4 3\n-1.0\n" + grey[::-1].tobytes())
-    with pytest.raises(ImageError, match="1 of 12 pixels are no numbers"):
+    with pytest.raises(ImageError, match="1 of 12 pixels are not finite numbers"):
         load_image(path)

@@ -96,5 +96,5 @@ def test_writes_atomically_where_the_store_does_not(store: Any, monkeypatch: pyt
 
 def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "upath", None)
-    with pytest.raises(UsageError, match=r'pip install "warpsplat\[remote\]"'):
+    with pytest.raises(UsageError, match=r"pip install 'warpsplat\[remote\]'"):
         remote("memory://bucket/a.png")

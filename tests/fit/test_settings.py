@@ -7,7 +7,7 @@ import pytest
 
 from warpsplat.errors import UsageError
 from warpsplat.fit.options import parse_bytes, parse_duration
-from warpsplat.fit.settings import FILL_POINT_RATE, PRESETS, Settings, make_settings
+from warpsplat.fit.settings import FILL_POINT_RATE, PRESETS, Settings, make_settings, solid_color
 from warpsplat.scene import Basis, Kind
 
 FINGERPRINTS: list[tuple[dict[str, Any], str]] = [
@@ -63,7 +63,10 @@ def test_density_may_be_given_in_part() -> None:
         ({"kind": "round"}, "kind must be a Kind, not 'round'"),
         *(({"basis": bad}, "basis must be one of cubic, spline, not") for bad in ("quartic", 7)),
         ({"quality": "best"}, "quality must be one of draft, balanced, high, not 'best'"),
-        ({"background": "red"}, "background must be auto, none or a colour as #ffffff, not 'red'"),
+        (
+            {"background": "red"},
+            "background must be auto, none or a colour such as '#fff' (in quotes, ",
+        ),
         ({"title": "x" * 1001}, "title must be a text of at most 1000 characters"),
         ({"rates": 3}, "rates must be a mapping"),
         ({"rates": {"points": -1}}, "rates points must be a number from 0 to"),
@@ -71,21 +74,22 @@ def test_density_may_be_given_in_part() -> None:
         ({"density": {"stop": 2}}, "density stop must be a number from 0 to 1, not 2"),
         ({"density": {"intervall": 3}}, "unknown setting 'intervall' in density; did you mean 'interval'?"),
         ({"colour": 3}, "unknown setting 'colour'; did you mean 'colors'?"),
-        ({"closed": True, "open": True}, "closed and open do not go together"),
+        ({"closed": True, "open": True}, "closed and open cannot be combined"),
         ({"renderer": "splat", "basis": "spline"}, "renderer splat needs the basis cubic"),
         ({"renderer": "gaussian", "paint": "auto"}, "renderer gaussian needs the paint flat"),
-        ({"renderer": "gaussian", "colors": 4}, "opaque fills and the renderer gaussian do not go together"),
-        ({"paint": "auto", "colors": 4}, "paint auto and a palette do not go together"),
-        ({"mixed": True, "open": True}, "mixed and open do not go together"),
-        ({"mixed": True, "renderer": "splat"}, "mixed and the renderer splat do not go together"),
-        ({"subject": "drawing", "open": True}, "subject drawing and open do not go together"),
-        ({"subject": "drawing", "paint": "auto"}, "subject drawing and paint auto do not go together"),
-        ({"subject": "line", "max_bytes": 900}, "subject line and max-bytes do not go together"),
+        ({"renderer": "gaussian", "colors": 4}, "opaque fills and the renderer gaussian cannot be combined"),
+        ({"paint": "auto", "colors": 4}, "paint auto and colors cannot be combined"),
+        ({"paint": "auto", "palette": "#fff"}, "paint auto and palette cannot be combined"),
+        ({"mixed": True, "open": True}, "mixed and open cannot be combined"),
+        ({"mixed": True, "renderer": "splat"}, "mixed and the renderer splat cannot be combined"),
+        ({"subject": "drawing", "open": True}, "subject drawing and open cannot be combined"),
+        ({"subject": "drawing", "paint": "auto"}, "subject drawing and paint auto cannot be combined"),
+        ({"subject": "line", "max_bytes": 900}, "subject line and max-bytes cannot be combined"),
         ({"levels": "5,x"}, "levels must be numbers of shapes"),
         ({"levels": "5,5"}, "levels must be ascending numbers of shapes"),
         ({"levels": "4,8", "curves": 9}, "curves 9 and the last of the levels"),
         ({"levels": "4,8", "max_bytes": "4KB"}, "levels and max-bytes"),
-        ({"size": "9x9mm", "page": "a4"}, "size and page do not go together"),
+        ({"size": "9x9mm", "page": "a4"}, "size and page cannot be combined"),
     ],
 )
 def test_what_is_refused(given: dict[str, Any], message: str) -> None:
@@ -107,3 +111,16 @@ def test_times_and_sizes() -> None:
         for parse in (parse_duration, parse_bytes):
             with pytest.raises(UsageError):
                 parse(bad)
+
+
+@pytest.mark.parametrize("color", ["#fff", "#FFF", "#FFFFFF", " #ffffff"])
+def test_one_reading_of_colours(color: str) -> None:
+    assert make_settings(background=color).background == "#ffffff"
+    assert make_settings(palette=color).palette == ("#ffffff",)
+    assert make_settings(palette=[color.strip()]).palette == ("#ffffff",)
+
+
+def test_a_short_colour_of_settings() -> None:
+    color = solid_color(Settings(background="#F80").background)
+    assert color is not None
+    assert (255 * color).round().tolist() == [255, 136, 0]

@@ -203,10 +203,10 @@ def test_few_shapes_are_fitted_to_fewer_pixels() -> None:
         ({"shape": "ellipse", "curves": "50"}, "curves must be"),
         ({"shape": "square"}, "shape must be one of curve, "),
         ({"shape": "polygon:2"}, "3 to 64 corners"),
-        ({"shape": "ellipse", "open": True}, "shape ellipse and open do not go together"),
-        ({"shape": "line", "closed": True}, "shape line and closed do not go together"),
+        ({"shape": "ellipse", "open": True}, "shape ellipse and open cannot be combined"),
+        ({"shape": "line", "closed": True}, "shape line and closed cannot be combined"),
         ({"shape": "circle", "mixed": True}, "mixed and shape circle"),
-        ({"shape": "circle", "subject": "drawing"}, "subject drawing and shape do not go together"),
+        ({"shape": "circle", "subject": "drawing"}, "subject drawing and shape cannot be combined"),
         ({"basis": "circle"}, "basis must be one of cubic, spline"),
     ],
 )

@@ -216,7 +216,7 @@ FAULTS: dict[str, tuple[Callable[[FloatArray], Any], str]] = {
     "flat gradient": (lambda image: (0.0, np.zeros(7)), r"the loss's gradient has shape \(7,\), not the"),
     "infinite gradient": (lambda image: (1.0, ZEROS(image) + np.inf), "gradient has numbers that are not"),
     "no gradient": (lambda image: 0.5, "the loss returned 0.5, without a gradient"),
-    "no number": (lambda image: ("much", ZEROS(image)), "the loss returned 'much', which is no number"),
+    "no number": (lambda image: ("much", ZEROS(image)), "the loss returned 'much', which is not a number"),
 }
 
 
@@ -231,10 +231,10 @@ def test_a_fault_is_one_clear_line(fault: str) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"loss": CustomLoss(slopes), "subject": "drawing"}, "subject drawing and a loss of your own"),
+        ({"loss": CustomLoss(slopes), "subject": "drawing"}, "subject drawing and a loss function"),
         ({"loss": "edgy"}, "loss must be one of l2, ssim, edges, not 'edgy'"),
         ({"loss": "ssim", "image": CLEAR}, "loss ssim needs an image without transparency"),
-        ({"loss": "edges", "subject": "pixel"}, "subject pixel and loss edges do not go together"),
+        ({"loss": "edges", "subject": "pixel"}, "subject pixel and loss edges cannot be combined"),
     ],
 )
 def test_refusals(given: dict[str, Any], message: str) -> None:
@@ -283,3 +283,23 @@ def test_functions_of_torch_are_told_by_their_file() -> None:
     assert uses_torch(functools.partial(in_file(functional=torch), target=0))
     layer = type("Layer", (), {"__call__": in_file(F=torch), "method": in_file(F=torch)})()
     assert uses_torch(layer) and uses_torch(layer.method)
+
+
+def test_a_target_of_a_fixed_size_is_told_of_with_target() -> None:
+    """Renders are smaller in most of a run."""
+    fixed = picture(64, 48)
+
+    def loss(image: FloatArray) -> Both:
+        return squared(image, fixed)
+
+    settings = make_settings(curves=4, iterations=10, coarse_pixels=300, subject="photo")
+    options: dict[str, Any] = {"settings": settings, "device": "cpu"}
+    with pytest.raises(UsageError, match=r"the loss raised ValueError: .*with_target=True"):
+        warpsplat.vectorize(fixed, loss=CustomLoss(loss, begin=0.0), **options)
+
+    def targeted(image: FloatArray, target: FloatArray) -> Both:
+        return squared(image, fixed)
+
+    with pytest.raises(UsageError) as caught:
+        warpsplat.vectorize(fixed, loss=CustomLoss(targeted, begin=0.0, with_target=True), **options)
+    assert "with_target" not in str(caught.value)

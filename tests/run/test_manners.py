@@ -9,6 +9,7 @@ import math
 import pydoc
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 
 import warpsplat
 from tests.scenes import contours_scene, mixed_scene, picture_scene, with_gradients
+from warpsplat.errors import UsageError
 from warpsplat.run.result import LevelScore
 from warpsplat.scene import Canvas, Kind, Picture, Rule, Scene
 from warpsplat.svg.viewer import render_svg
@@ -130,3 +132,25 @@ def test_help_begins_with_the_calls_that_matter() -> None:
     beginning = "\n".join(text.splitlines()[:16])
     for name in ("vectorize", "refine", "load_svg", "save_svg", "render", "score"):
         assert name in beginning
+
+
+def test_a_result_spares_files_of_others_if_it_is_told_to(tmp_path: Path) -> None:
+    path = tmp_path / "a.svg"
+    result = warpsplat.vectorize(np.zeros((8, 8, 3), np.uint8), subject="pixel")
+    path.write_text("<svg/>")
+    with pytest.raises(UsageError, match="was not written by warpsplat"):
+        result.save(path, overwrite=False)
+    assert path.read_text() == "<svg/>"
+    result.save(path)
+    result.save(path, overwrite=False)
+    assert path.read_text() == result.svg
+
+
+def test_a_result_is_no_file_of_another_kind(tmp_path: Path) -> None:
+    """An SVG's text in a .jpg could not be opened."""
+    result = warpsplat.vectorize(np.zeros((8, 8, 3), np.uint8), subject="pixel")
+    with pytest.raises(UsageError, match=r"a\.jpg: a result's name ends with \.svg, \.svgz, \.png or \.pdf"):
+        result.save(tmp_path / "a.jpg")
+    with pytest.raises(UsageError, match="curves must be several numbers of shapes, not 5"):
+        warpsplat.vectorize_several(np.zeros((8, 8, 3), np.uint8), 5)
+    assert not [*tmp_path.iterdir()]

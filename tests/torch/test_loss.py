@@ -78,7 +78,7 @@ def test_values_and_gradients_are_those_of_torch() -> None:
     [
         (lambda render: render.detach().mean(), "torch sees no path from the render to its value"),
         (lambda render: torch.ones((), requires_grad=True), "torch sees no path"),
-        (lambda render: 0.5, "the loss returned 0.5, which is no tensor"),
+        (lambda render: 0.5, "the loss returned 0.5, which is not a tensor"),
         (lambda render: render.mean() / 0, "the loss is inf"),
         (lambda render: (0 * render).sqrt().sum(), "gradient has numbers that are not finite"),
         (lambda render: render.mean(dim=0), r"the loss's value has shape \(7, 3\)"),

@@ -171,7 +171,7 @@ def executor_for(
     if gpus is not None and not name:
         raise UsageError("--gpus is for --executor ray; here --device chooses a GPU")
     if gpus is not None and gpus > 1 and not gpus.is_integer():
-        raise UsageError(f"--gpus {gpus:g}: must be a part of one GPU, as 0.25, or a whole number")
+        raise UsageError(f"--gpus {gpus:g}: must be a fraction of one GPU, such as 0.25, or a whole number")
     if name:
         from warpsplat.batch.executors.ray import RayCluster
 

@@ -15,7 +15,7 @@ from warpsplat.batch.results import MOST_NAMES
 from warpsplat.batch.run import JobOutcome
 from warpsplat.cli.echo import echo
 from warpsplat.cli.run import SUBJECTS, summary
-from warpsplat.errors import printable
+from warpsplat.errors import counted, printable
 from warpsplat.run.formats import is_picture
 
 CLEAR = "\r\x1b[2K"
@@ -131,8 +131,8 @@ class BatchDisplay:
             )
         elif not self._quiet:
             did = ", ".join(f"{n} {name}" for name, n in counts.items())
-            by = f", {workers} workers" if workers > 1 else ""
-            echo(f"{self._total} images: {did} ({elapsed:.1f} s{by})")
+            by = f", {counted(workers, 'worker')}" if workers > 1 else ""
+            echo(f"{counted(self._total, 'image')}: {did} ({elapsed:.1f} s{by})")
             for row in self._table():
                 echo("  ".join([f"  {row[0]:9}", *(f"{cell:>9}" for cell in row[1:])]).rstrip())
         if self._quiet:

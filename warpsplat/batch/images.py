@@ -29,7 +29,7 @@ def find_images(name: str, base: Path) -> list[FoundImage]:
     try:
         found = list(_found(name, base))
     except (ValueError, RuntimeError, OSError, NotImplementedError) as error:
-        raise UsageError(f"{name!r} is no usable pattern: {error}") from error
+        raise UsageError(f"{name!r} is not a usable pattern: {error}") from error
     if not found:
         raise UsageError(f"nothing matches {name!r}")
     return found

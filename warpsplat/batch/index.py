@@ -62,7 +62,7 @@ def _row(
         "report": _address(report, reports) if there and report.exists() else "",
         "status": status,
         "error": printable(error),
-        "exact": "psnr" in figures and figures["psnr"] is None and figures.get("ssim") == 1,
+        "exact": figures.get("exact") is True,
         **{name: figures.get(name) for name in NUMBERS},
     }
 

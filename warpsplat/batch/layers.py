@@ -93,7 +93,8 @@ def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
     inner = next(iter(value.values())) if key in NESTED else value
     try:
         if inner is None:
-            raise UsageError(f"{name} has no value")
+            hint = BY_NAME[key].hint if key in BY_NAME else ""
+            raise UsageError(f"{name} has no value{hint}")
         if key in KINDS:
             if value is not True:
                 raise UsageError(f"must be true, not {shown(value)}; leave it out or give the other kind")
@@ -128,7 +129,7 @@ def assigned(text: str) -> tuple[str, Any]:
     try:
         value = written if key in TEXT_KEYS else plain(written)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UsageError(f"--set {cut(text)}: no plain value") from error
+        raise UsageError(f"--set {cut(text)}: the value is not plain YAML") from error
     return key, {inner: value} if dot else value
 
 

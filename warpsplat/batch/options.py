@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.options import (
-    FILE,
+    OUTPUT,
     importance_option,
     overwrite_option,
     quality_options,
@@ -56,7 +56,7 @@ class Shard(click.ParamType):
             return value
         found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", value)
         if not found or not 1 <= int(found[1]) <= int(found[2]):
-            self.fail(f"{shown(value)} is no I/N, as 1/4 for the first of four parts", param, ctx)
+            self.fail(f"{shown(value)} is not of the form I/N, such as 1/4: the first of four", param, ctx)
         return int(found[1]), int(found[2])
 
 
@@ -73,7 +73,7 @@ batch_options = together(
         "sets",
         multiple=True,
         metavar="KEY=VALUE",
-        help="Any key of batch files, as curves=64; may be there several times.",
+        help="Any key of batch files, such as curves=64; may be repeated.",
     ),
     click.option("-n", "--dry-run", is_flag=True, help="Say what would be done, and do nothing."),
     click.option("--retry-failed", is_flag=True, help="Try again what failed in an earlier run."),
@@ -98,13 +98,13 @@ batch_options = together(
     click.option("--shard", type=Shard(), default=(1, 1), help="Do part I of N of the images: 1/4."),
     click.option(
         "--manifest",
-        type=FILE,
+        type=OUTPUT,
         metavar="FILE",
         help="Notes of what was made, as JSON lines.  [default: warpsplat-manifest.jsonl, with the results]",
     ),
     click.option(
         "--report",
-        type=FILE,
+        type=OUTPUT,
         metavar="DIR",
         help="Pages on the results, and DIR/index.html, which lists them; or a name that ends with .html.",
     )

@@ -174,7 +174,7 @@ def _expanded(images: list[FoundImage], layers: Sequence[Layer], start: ErrorAt)
         }
         try:
             settings = settings_from(options)
-        except UsageError as error:  # values that do not go together
+        except UsageError as error:  # values that cannot be combined
             raise start(str(error)) from error
         error_at = values["output"].error if "output" in values else start
         fields = fields_of(settings, {key: value for key, value in given.items() if key not in NESTED})

@@ -1,4 +1,4 @@
-"""Drawings fitted by their lightness, where the image knows colours at half its resolution, as JPEG does."""
+"""Fit drawings by lightness alone if the image stores colours at half its resolution, as JPEG does."""
 
 from __future__ import annotations
 

@@ -24,6 +24,7 @@ from warpsplat.drawing.draft import (
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import LEAST_ERROR, Finished
+from warpsplat.errors import counted
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -128,7 +129,7 @@ def announce_fit(nodes: int, problem: Problem) -> None:
     """Say so if the fit of a drawing with so many traced nodes will take long."""
     width, height = problem.size
     seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
-    _announce(problem, f"fitting its {nodes:,} nodes", seconds)
+    _announce(problem, f"fitting its {counted(nodes, 'node')}", seconds)
 
 
 def _announce(problem: Problem, work: str, seconds: float) -> None:

@@ -36,7 +36,7 @@ class Equal(NamedTuple):
     """Equal outlines."""
 
     contours: list[IndexArray]
-    """Contours of each; those of all correspond, shape (outline, contour)."""
+    """Indices of each outline's contours, in corresponding order, shape (outline, contour)."""
 
 
 def with_equal_outlines(

@@ -83,7 +83,7 @@ def turned(vectors: Floats) -> Floats:
 
 
 class OutlineFit:
-    """Fits the outlines of a drawing jointly, by exact coverage at full size; all but their points stays.
+    """Fits the outlines of a drawing jointly, by exact coverage at full size; only their points move.
 
     By steps of Gauss and Newton with damping (Levenberg 1944, Marquardt 1963) that follows, for each cubic,
     whether the error around it falls.

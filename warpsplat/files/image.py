@@ -315,7 +315,7 @@ def _white(image: Image.Image) -> float:
         largest = max(largest, float(finite.max())) if finite.size else largest
     if missing:
         share = f"{missing} of {image.width * image.height} pixels"
-        raise ImageError(f"{share} are no numbers (NaN or infinite)")
+        raise ImageError(f"{share} are not finite numbers")
     # Nothing in the file defines white: take the least of the usual values that no sample exceeds.
     tops = [255.0, 65535.0, 2**31 - 1.0] if image.mode == "I" else [1.0, 255.0, 65535.0]
     return next((top for top in tops if largest <= top), largest)

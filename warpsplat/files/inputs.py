@@ -48,7 +48,8 @@ def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) ->
     except FileNotFoundError:
         raise ImageError(f"{name}: no such file") from None
     except IsADirectoryError:
-        raise ImageError(f"{name}: is a folder, not {what}") from None
+        hint = "; warpsplat batch takes folders" if what == "an image" else ""
+        raise ImageError(f"{name}: is a folder, not {what}{hint}") from None
     except PermissionError:
         raise ImageError(f"{name}: no permission to read it") from None
     except (OSError, ValueError) as error:  # a loop of links, a name with a NUL, a name too long

@@ -21,10 +21,12 @@ from pathlib import Path
 from warpsplat.errors import OutputError, UsageError, cause_of
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.marks import HEAD, TAIL, is_marked
-from warpsplat.files.remote import is_remote, read_remote, write_remote
+from warpsplat.files.remote import check_remote, exists, is_remote, read_remote, write_remote
 
 SVG_ENDINGS = (".svg", ".svgz")
 """Endings of SVG files; the second kind is gzipped."""
+
+FOREIGN = "exists and was not written by warpsplat; --overwrite replaces it"
 
 _unfinished: set[str] = set()
 """Temporary files of this process."""
@@ -46,20 +48,32 @@ def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), over
     if path == STANDARD:
         return
     try:
+        if is_remote(path):
+            check_remote(path)
+            if not overwrite and exists(path) and not may_replace(path):
+                raise UsageError(f"{path}: {FOREIGN}")
+            return
         target = check_target(path)
-        if any(source.exists() and target == Path(os.path.realpath(source)) for source in sources):
+        local = [source for source in sources if not is_remote(source)]
+        if any(source.exists() and target == Path(os.path.realpath(source)) for source in local):
             raise UsageError(f"{path}: is the input itself; give another output")
         try:
             check_folder(target.parent)
         except UsageError as error:
             raise UsageError(f"{path}: {error}") from error
-        if endings and path.suffix.lower() not in endings:
-            known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
-            raise UsageError(f"{path}: is no kind of result; a result's name ends with {known}")
+        if endings:
+            check_ending(path, endings)
         if not overwrite and not may_replace(path):
-            raise UsageError(f"{path}: exists and was not written by warpsplat; --overwrite replaces it")
+            raise UsageError(f"{path}: {FOREIGN}")
     except (OSError, ValueError) as error:
         raise UsageError(f"{str(path)[:200]}: cannot be written: {cause_of(error)}") from error
+
+
+def check_ending(path: Path, endings: tuple[str, ...]) -> None:
+    """Raise ``UsageError`` unless a name has one of the ``endings``."""
+    if path.suffix.lower() not in endings:
+        known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+        raise UsageError(f"{path}: a result's name ends with {known}")
 
 
 def check_folder(folder: Path) -> None:

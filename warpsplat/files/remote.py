@@ -12,7 +12,7 @@ import re
 import time
 from collections.abc import Iterator
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from warpsplat.errors import ImageError, OutputError, UsageError, WarpsplatError, cause_of, printable
 
@@ -35,6 +35,14 @@ _listed: dict[str, tuple[float, frozenset[str]]] = {}
 """Folder -> when it was listed, and the names in it."""
 
 
+@runtime_checkable
+class ReadablePath(Protocol):
+    """A path of pathlib, or one behind a URL."""
+
+    def read_bytes(self) -> bytes:
+        """Return the content of the file."""
+
+
 def is_url(name: str) -> bool:
     """Return whether the name of a file is a URL."""
     return URL.match(name) is not None
@@ -43,6 +51,14 @@ def is_url(name: str) -> bool:
 def is_remote(path: PurePath) -> bool:
     """Return whether a path is behind a URL."""
     return not isinstance(path, PurePath)
+
+
+def path_of(name: str | os.PathLike[str] | ReadablePath) -> Path:
+    """Return the path of a file, by its name or URL; errors are those of ``remote``."""
+    if isinstance(name, str):
+        return remote(name) if is_url(name) else Path(name)
+    found: Any = Path(name) if isinstance(name, os.PathLike) else name
+    return found
 
 
 def remote(url: str) -> Path:
@@ -54,7 +70,7 @@ def remote(url: str) -> Path:
     try:
         from upath import UPath
     except ImportError as error:
-        raise UsageError(f'{printable(url)}: {error}; pip install "warpsplat[remote]" installs it') from error
+        raise UsageError(f"{printable(url)}: URLs need: pip install 'warpsplat[remote]'") from error
     try:
         path: Any = UPath(url)
         if path.protocol in ("file", "local"):

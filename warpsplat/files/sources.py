@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -13,6 +12,7 @@ from PIL import Image, ImageOps
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.image import check_size, composited, decoded, reduced, without_opacity
 from warpsplat.files.inputs import MAX_INPUT, check_data, input_name, read_input
+from warpsplat.files.remote import ReadablePath, path_of
 from warpsplat.portable.filters import boxed, grey
 from warpsplat.scene import FloatArray
 
@@ -27,22 +27,29 @@ class Readable(Protocol):
 
 BytesLike = bytes | bytearray | memoryview
 
-ImageSource = str | os.PathLike[str] | BytesLike | Readable | Image.Image | npt.NDArray[Any]
-"""A file's path, an image file's bytes, a file open for reading, a Pillow image, or pixels: uint8, uint16,
-bool, or floats in [0, 1], shape (height, width) or (height, width, channels): grey, grey and opacity, RGB, or
-RGB and straight opacity."""
+FilePath = str | os.PathLike[str] | ReadablePath
+"""The path or URL of a file."""
+
+FILE_PATHS = (str, os.PathLike, ReadablePath)
+"""Its types, for ``isinstance``."""
+
+ImageSource = FilePath | BytesLike | Readable | Image.Image | npt.NDArray[Any]
+"""A file's path or URL, an image file's bytes, a file open for reading, a Pillow image, or pixels: uint8,
+uint16, bool, or floats in [0, 1], shape (height, width) or (height, width, channels): grey, grey and opacity,
+RGB, or RGB and straight opacity."""
 
 
-def source_bytes(source: str | os.PathLike[str] | BytesLike | Readable, what: str = "an image") -> bytes:
-    """Return the content of a path, bytes or an open file.
+def source_bytes(source: FilePath | BytesLike | Readable, what: str = "an image") -> bytes:
+    """Return the content of a path, a URL, bytes or an open file.
 
     Raises:
+        UsageError: A URL, and no package that reads it.
         ImageError: It cannot be read, is empty or larger than ``MAX_INPUT``.
     """
     if isinstance(source, BytesLike):
         return bytes(source)
-    if isinstance(source, (str, os.PathLike)):
-        return read_input(Path(source), what)
+    if isinstance(source, FILE_PATHS):
+        return read_input(path_of(source), what)
     name = source_name(source)
     try:
         data = source.read(MAX_INPUT + 1)
@@ -62,13 +69,13 @@ def held(source: ImageSource) -> ImageSource:
     Raises:
         ImageError: As ``source_bytes``.
     """
-    return source_bytes(source) if isinstance(source, (str, os.PathLike, BytesLike, Readable)) else source
+    return source_bytes(source) if isinstance(source, (*FILE_PATHS, BytesLike, Readable)) else source
 
 
 def source_name(source: object, default: str = "the image") -> str:
     """Return what messages call a source."""
-    if isinstance(source, (str, os.PathLike)):
-        return input_name(Path(source))
+    if isinstance(source, FILE_PATHS):
+        return input_name(path_of(source))
     name = getattr(source, "filename", None) or getattr(source, "name", None)
     return name if isinstance(name, str) else default
 
@@ -101,7 +108,7 @@ def image_of(
         TypeError: Not an ``ImageSource``.
     """
     name = name or source_name(source)
-    if isinstance(source, (str, os.PathLike, BytesLike, Readable)):
+    if isinstance(source, (*FILE_PATHS, BytesLike, Readable)):
         with decoded(source_bytes(source), name, factor) as (image, left):
             return reduced(image, paper, left, name)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType, ModuleType
@@ -26,6 +27,12 @@ The value is a number, or has one for each pixel, shape (height, width), whose m
 are then placed where it is large, else where the gradient is.
 """
 
+
+CHANGING = (
+    "the render has {0} by {1} pixels now, and others later: CustomLoss(function, with_target=True) calls it "
+    "with the target at the render's size"
+)
+"""For messages about errors that name a side of the render."""
 
 BEGIN = 0.5
 """``CustomLoss.begin`` of losses that replace the squared error."""
@@ -134,7 +141,10 @@ def evaluate(function: LossFunction, image: FloatArray, *target: FloatArray) -> 
     except (UsageError, MemoryError):
         raise
     except Exception as error:
-        raise UsageError(f"the loss raised {type(error).__name__}: {cause_of(error)}") from error
+        cause = cause_of(error)
+        sides = {str(side) for side in image.shape[:2]} & {*re.findall(r"\d+", cause)}
+        hint = f"; {CHANGING.format(*image.shape)}" if sides and not target else ""
+        raise UsageError(f"the loss raised {type(error).__name__}: {cause}{hint}") from error
     if not (isinstance(found, tuple) and len(found) == 2):
         raise UsageError(
             f"the loss returned {shown(found)}, without a gradient: it must return (value, gradient), or be "
@@ -159,4 +169,4 @@ def _as_array(value: object) -> FloatArray:
     try:
         return np.asarray(value, np.float32)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise UsageError(f"the loss returned {shown(value)}, which is no number or array") from error
+        raise UsageError(f"the loss returned {shown(value)}, which is not a number or array") from error

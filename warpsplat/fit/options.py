@@ -30,7 +30,10 @@ SIZE_UNITS = {
 MAX_DIGITS = 15
 """Digits of a time or size in a text: beyond, it is a slip of the keys."""
 
-PALETTE_COLOR = re.compile(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+COLOR = re.compile(r"#([0-9a-f]{3}|[0-9a-f]{6})", re.IGNORECASE)
+
+QUOTED = "in quotes, as an unquoted # begins a comment"
+"""How shells and YAML files want colours, for messages."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +62,11 @@ class Option:
     def keyword(self) -> str:
         """The keyword of ``make_settings``."""
         return self.name.replace("-", "_")
+
+    @property
+    def hint(self) -> str:
+        """For messages about a missing value."""
+        return f"; write it {QUOTED}" if self.metavar.startswith("COLOR") else ""
 
     @property
     def default_text(self) -> str:
@@ -200,7 +208,21 @@ def parse_levels(value: object) -> tuple[int, ...]:
     try:
         return tuple(int(str(part)) for part in parts)
     except ValueError as error:
-        raise UsageError(f"levels must be numbers of shapes as 64,256,1024, not {shown(value)}") from error
+        raise UsageError(f"levels must be numbers of shapes, as in 64,256, not {shown(value)}") from error
+
+
+def color_of(text: str) -> str | None:
+    """Return ``#F80`` or ``#ff8800`` as ``#ff8800``; None for anything else."""
+    found = COLOR.fullmatch(text)
+    if not found:
+        return None
+    digits = found[1].lower()
+    return "#" + (digits if len(digits) == 6 else "".join(2 * digit for digit in digits))
+
+
+def parse_background(value: object) -> object:
+    """Return a colour as ``#ff8800``; anything else is left to be checked."""
+    return color_of(value.strip()) or value if isinstance(value, str) else value
 
 
 def parse_palette(value: object) -> tuple[str, ...]:
@@ -211,9 +233,8 @@ def parse_palette(value: object) -> tuple[str, ...]:
     parts = value if _is_list(value) else re.split(r"[,\s]+", _words(value).strip(", \t\n"))
     colors: dict[str, None] = {}
     for part in parts:
-        found = PALETTE_COLOR.fullmatch(_words(part))
-        if not found:
-            raise UsageError(f"palette must be colours as #ff8800,#fff, not {shown(part)}")
-        digits = found[1].lower()
-        colors["#" + (digits if len(digits) == 6 else "".join(2 * digit for digit in digits))] = None
+        color = color_of(_words(part))
+        if color is None:
+            raise UsageError(f"palette must be colours such as '#ff8800,#fff' ({QUOTED}), not {shown(part)}")
+        colors[color] = None
     return tuple(colors)

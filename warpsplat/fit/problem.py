@@ -55,7 +55,8 @@ class Run:
     """
 
     device: Backend | Callable[[], Backend]
-    """The device, or a function that starts it when it is first needed: a draft of a drawing needs none."""
+    """The device, or a function that starts it when it is first needed: a draft of a drawing needs none.
+    A function is cached (``functools.cache``)."""
     on_progress: Callback | None = None
     stop: Callable[[], bool] | None = None
     """Called after every step; once it returns True, the current shapes are the result."""
@@ -75,6 +76,12 @@ class Run:
     def backend(self) -> Backend:
         """The device."""
         return self.device() if callable(self.device) else self.device
+
+    @property
+    def device_name(self) -> str:
+        """Name of the device that was used: the CPU if none was started."""
+        started = getattr(self.device, "cache_info", None)
+        return "cpu" if started and not started().currsize else str(self.backend.device)
 
     def stopped(self) -> bool:
         """Return whether the user wants the run to end, or its device failed."""

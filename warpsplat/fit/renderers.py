@@ -30,7 +30,7 @@ class FitRenderer:
         return preset
 
     def check(self, settings: Settings) -> None:
-        """Raise ``UsageError`` if the settings do not go together with this renderer."""
+        """Raise ``UsageError`` if the settings cannot be combined with this renderer."""
 
     def model(self, settings: Settings, step: int, slack: float) -> Model:
         """Return the model of coverage after ``step`` steps; ``slack``: see ``ExactModel``."""
@@ -56,5 +56,5 @@ def renderer_of(name: str) -> FitRenderer:
     """Return a renderer by its name; raise ``UsageError`` if there is none."""
     found = load_renderer(name)
     if not isinstance(found, FitRenderer):
-        raise UsageError(f"renderer {name} is no FitRenderer")
+        raise UsageError(f"renderer {name} is not a FitRenderer")
     return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
@@ -16,10 +15,14 @@ from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.field_docs import described
 from warpsplat.fit.options import (
+    COLOR,
+    QUOTED,
     Option,
+    color_of,
     nearest,
     option,
     options_of,
+    parse_background,
     parse_bytes,
     parse_duration,
     parse_levels,
@@ -53,8 +56,6 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"
-
-COLOR = "#[0-9a-fA-F]{6}"
 
 MOST_COLOR_COUNT = 256
 
@@ -233,7 +234,10 @@ class Settings:
     )
     colors: int | None = option(None, "At most N colours; the shapes are then opaque.", (1, MOST_COLOR_COUNT))
     palette: tuple[str, ...] = option(
-        (), "The only colours, #ff8800,#fff ... or a file with them.", metavar="COLORS", parse=parse_palette
+        (),
+        "The only colours, as '#f80,#fff' in quotes, or a file of them.",
+        metavar="COLORS",
+        parse=parse_palette,
     )
     opaque: bool = option(False, "No translucent shapes.")
     target_psnr: float | None = option(
@@ -265,10 +269,11 @@ class Settings:
     seed: int = option(0, "Random seed.", (0, 2**32 - 1))
     background: str = option(
         "auto",
-        "auto (transparent where the image is), none, or a colour (#rrggbb).",
-        pattern=f"auto|none|{COLOR}",
-        wanted="auto, none or a colour as #ffffff",
+        "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
+        pattern=f"auto|none|(?i:{COLOR.pattern})",
+        wanted=f"auto, none or a colour such as '#fff' ({QUOTED})",
         metavar="COLOR",
+        parse=parse_background,
         refine=True,
     )
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
@@ -345,7 +350,7 @@ class Settings:
             if is_broken(self):
                 raise UsageError(message.format(self))
         if unsuited := self.unsuited(self.subject):
-            raise UsageError(f"subject {self.subject} and {unsuited[0]} do not go together")
+            raise UsageError(f"subject {self.subject} and {unsuited[0]} cannot be combined")
 
     @property
     def form(self) -> tuple[Basis, int]:
@@ -358,6 +363,11 @@ class Settings:
     def is_limited(self) -> bool:
         """Whether the file may have some colours only."""
         return self.colors is not None or bool(self.palette)
+
+    @property
+    def limited_by(self) -> str:
+        """Name of the option that limits the colours."""
+        return "palette" if self.palette else "colors"
 
     @property
     def counting(self) -> list[str]:
@@ -383,18 +393,18 @@ class Settings:
 
 
 RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
-    (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open do not go together"),
-    (lambda s: s.mixed and s.shape != CURVE, "mixed and shape {0.shape} do not go together"),
+    (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open cannot be combined"),
+    (lambda s: s.mixed and s.shape != CURVE, "mixed and shape {0.shape} cannot be combined"),
     (
         lambda s: s.shape not in (CURVE, LINE) and s.kind == Kind.STROKE,
-        "shape {0.shape} and open do not go together",
+        "shape {0.shape} and open cannot be combined",
     ),
-    (lambda s: s.shape == LINE and s.kind == Kind.FILL, "shape line and closed do not go together"),
+    (lambda s: s.shape == LINE and s.kind == Kind.FILL, "shape line and closed cannot be combined"),
     (
         lambda s: s.shape != CURVE and s.renderer != "exact",
-        "shape {0.shape} and renderer {0.renderer} do not go together",
+        "shape {0.shape} and renderer {0.renderer} cannot be combined",
     ),
-    (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and a palette do not go together"),
+    (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and {0.limited_by} cannot be combined"),
     (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
         lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
@@ -404,8 +414,8 @@ RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
         lambda s: s.levels and s.levels[-1] != s.curves,
         "curves {0.curves} and the last of the levels {0.levels} differ",
     ),
-    (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} do not go together"),
-    (lambda s: s.size and s.page, "size and page do not go together"),
+    (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} cannot be combined"),
+    (lambda s: s.size and s.page, "size and page cannot be combined"),
 )
 """Contradictions: whether settings have one, and its message, in which ``{0}`` stands for them. Those with a
 subject follow from ``Option.subjects``, those with a renderer from ``FitRenderer.check``."""
@@ -413,9 +423,10 @@ subject follow from ``Option.subjects``, those with a renderer from ``FitRendere
 
 def solid_color(background: str) -> FloatArray | None:
     """Return the colour that ``Settings.background`` names, sRGB in [0, 1], shape (3,); None if none."""
-    if not re.fullmatch(COLOR, background):
+    color = color_of(background)
+    if color is None:
         return None
-    return np.frombuffer(bytes.fromhex(background[1:]), np.uint8).astype(np.float32) / np.float32(255)
+    return np.frombuffer(bytes.fromhex(color[1:]), np.uint8).astype(np.float32) / np.float32(255)
 
 
 def levels_of(curves: int) -> tuple[int, ...]:
@@ -456,7 +467,7 @@ def expand(given: dict[str, Any]) -> None:
     """Replace shorthands among the ``given`` options by what they stand for, and add what options require."""
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
-        raise UsageError("closed and open do not go together")
+        raise UsageError("closed and open cannot be combined")
     if closed or is_open or closed is False:
         given["kind"] = Kind.FILL if closed else Kind.STROKE
     if given.get("shape") == LINE:

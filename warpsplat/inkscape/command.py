@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import FILE
+from warpsplat.cli.options import OUTPUT
 from warpsplat.errors import UsageError
 
 SOURCE = Path(__file__).parent
@@ -28,7 +28,7 @@ FLATPAK = ".var"
 @click.command("inkscape", context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--folder",
-    type=FILE,
+    type=OUTPUT,
     help="Inkscape's folder of extensions (Edit > Preferences > System: User extensions).  [default: the"
     " one that Inkscape names]",
 )

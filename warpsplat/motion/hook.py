@@ -12,7 +12,7 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, RunHook
-from warpsplat.cli.options import FILE
+from warpsplat.cli.options import OUTPUT
 from warpsplat.errors import UsageError
 
 if TYPE_CHECKING:
@@ -29,7 +29,10 @@ class MotionHook(RunHook):
 
     options = {  # noqa: RUF012
         "animate": click.option(
-            "--animate", type=FILE, metavar="FILE", help="Also write an animation: .svg, .gif, .webp or .mp4."
+            "--animate",
+            type=OUTPUT,
+            metavar="FILE",
+            help="Also write an animation: .svg, .gif, .webp or .mp4.",
         ),
         "animate_what": click.option(
             "--animate-what",

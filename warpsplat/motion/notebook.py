@@ -7,6 +7,7 @@ import io
 import time
 from typing import Any
 
+from warpsplat.errors import counted
 from warpsplat.fit.progress import Progress
 from warpsplat.run.render import to_pillow
 
@@ -49,7 +50,8 @@ class Live:
             to_pillow(progress.snapshot.image()).save(out, "PNG")
             source = base64.b64encode(out.getvalue()).decode()
             self._picture = f'<br><img src="data:image/png;base64,{source}" width="{self._width}" alt="">'
-        words = f"step {progress.step} of {progress.steps}, {progress.psnr:.1f} dB, {progress.shapes} shapes"
+        shapes = counted(progress.shapes, "shape")
+        words = f"step {progress.step} of {progress.steps}, {progress.psnr:.1f} dB, {shapes}"
         bar = f'<progress value="{progress.work:.3f}" max="1"></progress>'
         self._show(self._html(f"{bar} {words}, {progress.seconds:.0f} s{self._picture}"))
         self._show = self._handle.update

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.hooks import Done, RunHook
-from warpsplat.cli.options import FILE
+from warpsplat.cli.options import OUTPUT
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD
 from warpsplat.files.output import check_output
@@ -24,7 +24,7 @@ class ReportHook(RunHook):
     options = {  # noqa: RUF012 - declared in the base class
         "report": click.option(
             "--report",
-            type=FILE,
+            type=OUTPUT,
             metavar="FILE.html",
             help="Page on the result: image and SVG under a slider, error map, shapes, figures.",
         )

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from warpsplat.files.output import write_result
+from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.pages.reports.several import several_page, versions_of
 from warpsplat.pages.reports.single import Facts, report_page
@@ -59,5 +60,5 @@ def report(
         with backend_on(device, threads) as backend:
             made = report_page(text, image, backend(), facts, name=name, svg_name=svg_name, own=own)
     if output is not None:
-        write_result(Path(output), made.encode())
+        write_result(path_of(output), made.encode())
     return made

@@ -42,7 +42,7 @@ class Splat(FitRenderer):
     def check(self, settings: Settings) -> None:
         """See ``FitRenderer``."""
         if settings.mixed:
-            raise UsageError(f"mixed and the renderer {settings.renderer} do not go together")
+            raise UsageError(f"mixed and the renderer {settings.renderer} cannot be combined")
         if settings.basis != Basis.CUBIC:
             raise UsageError(f"renderer {settings.renderer} needs the basis cubic")
 
@@ -73,7 +73,7 @@ class Gaussian(Splat):
     def check(self, settings: Settings) -> None:
         """See ``FitRenderer``."""
         if settings.opaque or settings.is_limited:
-            raise UsageError("opaque fills and the renderer gaussian do not go together")
+            raise UsageError("opaque fills and the renderer gaussian cannot be combined")
         super().check(settings)
         if settings.paint != "flat":
             raise UsageError("renderer gaussian needs the paint flat")

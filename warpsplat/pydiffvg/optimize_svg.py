@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import torch
 
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, counted
 from warpsplat.pydiffvg.device import nearest
 from warpsplat.pydiffvg.element import Context, OptimizableElement
 from warpsplat.pydiffvg.optimizable import COLORS, optimized
@@ -140,7 +140,7 @@ class OptimizableSvg:
         elements = list(self.root.walk())
         if verbose:
             shapes = sum(bool(element.paths) for element in elements)
-            print(f"{path}: {len(elements)} elements, {shapes} of them shapes")
+            print(f"{path}: {counted(len(elements), 'element')}, {counted(shapes, 'shape')} among them")
         self.scene: tuple[int, int, list[Shape], list[ShapeGroup]] | None = None
         """Last result of ``build_scene``."""
         self.background = torch.ones(3, device=self.device)

@@ -108,7 +108,7 @@ def _color(part: Drawn) -> Color:
     if isinstance(paint, FlatColor):
         return torch.tensor([*paint.color, part.opacity * paint.opacity])
     if not isinstance(paint, Gradient):
-        raise ImageError("shows a picture, which is no paint of pydiffvg")
+        raise ImageError("shows a picture, which pydiffvg cannot paint with")
     return gradient_of(paint, part.opacity)
 
 

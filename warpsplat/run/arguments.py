@@ -13,7 +13,7 @@ from warpsplat.errors import UsageError, shown
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.options import nearest
 from warpsplat.fit.settings import Settings
-from warpsplat.run.options import settings_from
+from warpsplat.run.options import settings_from, with_preset
 
 if TYPE_CHECKING:
     from warpsplat.rendering.backend import Backend
@@ -49,13 +49,13 @@ def check_keywords(function: Callable[..., Any], options: Mapping[str, object]) 
 
 
 def settings_given(function: Callable[..., Any], settings: Settings | None, **options: Any) -> Settings:
-    """Return the settings, or those that the options of ``function`` make.
+    """Return the settings, or those that the options of ``function``, over a preset, make.
 
     Raises ``TypeError`` for unknown options, and ``UsageError`` if both are given or an option is not valid.
     """
     check_keywords(function, options)
     if settings is None:
-        return settings_from(options)
+        return settings_from(with_preset(options.pop("preset", None), options))
     if others := [name for name, value in options.items() if value is not None]:
         raise UsageError(f"settings are given, and {others[0]} as well")
     return settings

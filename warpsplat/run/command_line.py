@@ -84,7 +84,7 @@ def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
 
 
 def _settings(quality: Quality, given: dict[str, Any]) -> Settings | None:
-    """Return the settings, or None if the arguments do not go together."""
+    """Return the settings, or None if the arguments cannot be combined."""
     try:
         return make_settings(quality, **given)
     except UsageError:

@@ -6,8 +6,9 @@ import importlib.util
 from pathlib import Path
 
 from warpsplat.errors import UsageError
+from warpsplat.files.inputs import STANDARD
 from warpsplat.files.marks import mark_pdf, mark_png
-from warpsplat.files.output import SVG_ENDINGS, svg_bytes, write_result
+from warpsplat.files.output import SVG_ENDINGS, check_ending, svg_bytes, write_result
 from warpsplat.svg.viewer import draw_pdf, draw_png
 
 PICTURE_ENDINGS = (".png", ".pdf")
@@ -52,6 +53,8 @@ def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0) -> b
 def write_named(path: Path, text: str, *, zoom: float = 1.0) -> None:
     """Write ``named_bytes`` atomically; ``-`` is the standard output.
 
-    Raises its errors, and ``OutputError`` if the file cannot be written.
+    Raises its errors, ``UsageError`` for another ending, and ``OutputError`` if the file cannot be written.
     """
+    if path != STANDARD:
+        check_ending(path, ENDINGS)
     write_result(path, named_bytes(path, text, zoom=zoom))

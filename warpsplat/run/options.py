@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from warpsplat.errors import UsageError, printable
-from warpsplat.fit.options import Option, options_of
+from warpsplat.extensions import declared, load
+from warpsplat.fit.options import QUOTED, Option, options_of
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
 from warpsplat.scene import Kind
 
@@ -43,15 +44,31 @@ def read_palette(path: Path) -> str:
             raise UsageError(f"palette {printable(str(path))}: has more than {PALETTE_BYTES} bytes")
         return found.decode("ascii")
     except (OSError, ValueError) as error:
-        cause = error.strerror if isinstance(error, OSError) else "no text"
+        cause = error.strerror if isinstance(error, OSError) else "not text"
         if isinstance(error, UnicodeEncodeError) or "\0" in str(path):
-            cause = "holds a character that no name can have"
-        raise UsageError(f"palette {printable(str(path))}: {cause}; colours begin with #") from error
+            cause = "contains a character that file names cannot have"
+        raise UsageError(
+            f"palette {printable(str(path))}: {cause}; colours begin with #, {QUOTED}"
+        ) from error
+
+
+def with_preset(preset: str | None, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the options ``given``, None being left out, over those of a preset, if one is named.
+
+    Raises ``UsageError`` for an unknown preset.
+    """
+    if preset is None:
+        return given
+    target = declared("provides").get("with_preset")
+    if target is None:
+        raise UsageError("presets need the extension batch, which is not installed")
+    made: dict[str, Any] = load(target)(preset, given)
+    return made
 
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
     """Return ``make_settings`` of keywords in which a palette may be the name of a file."""
     palette = given.get("palette")
-    if isinstance(palette, str) and "#" not in palette:
+    if isinstance(palette, str) and palette.strip() and "#" not in palette:
         given = {**given, "palette": read_palette(Path(palette))}
     return make_settings(**given)

@@ -86,7 +86,7 @@ def prepare(
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
     if loss and chosen.subject != "photo":
-        raise UsageError(f"subject {chosen.subject} and a loss of your own do not go together")
+        raise UsageError(f"subject {chosen.subject} and a loss function cannot be combined")
     prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, reduction, name)
     if importance is None:
         return prepared
@@ -136,7 +136,7 @@ def starting_scene(
     settings = make_settings(
         curves=curves, kind=Kind.STROKE if open else None, seed=seed, background=background
     )
-    target = load_target(image, None, background)
+    target = load_target(image, None, settings.background)
     return grid_scene(settings, target, curves, np.random.default_rng(seed))
 
 

@@ -6,12 +6,12 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpsplat.errors import DeviceError, ImageError, naming
+from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
@@ -105,7 +105,7 @@ def refine(
         run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:
-        write_named(Path(output), result.svg)
+        write_named(path_of(output), result.svg)
     if run.failures:
         raise failed(run, name, result)
     if kept and not result.stopped:
@@ -172,6 +172,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         iterations=made.iterations,
         seconds=seconds,
         stopped=made.interrupted,
+        device=run.device_name,
         renewed=made.renewed,
         missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),
         history=tuple(history),

@@ -7,11 +7,13 @@ import hashlib
 import math
 import os
 from dataclasses import asdict, dataclass, field, fields
-from pathlib import Path
 from typing import Any
 
 from warpsplat._version import __version__
+from warpsplat.errors import counted
 from warpsplat.field_docs import described
+from warpsplat.files.output import check_output
+from warpsplat.files.remote import path_of
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.metrics import Score
@@ -60,6 +62,8 @@ class Result:
     """Time that it took."""
     stopped: bool
     """Whether the run was interrupted."""
+    device: str = field(default="cpu", compare=False)
+    """The device that was used: ``cpu`` or ``cuda:N``."""
     renderer: str = "exact"
     """Coverage model of the training."""
     render_ssim: float | None = None
@@ -83,17 +87,21 @@ class Result:
     kept: str = ""
     """Elements that a refined SVG keeps as they are, for people; empty: none."""
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the result; an existing file is replaced atomically.
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = True) -> None:
+        """Write the result atomically; an existing file is replaced, whoever wrote it.
 
+        ``overwrite=False`` refuses to replace a file that warpsplat did not write, as the command line does.
         The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, or ``.pdf``
         (the extra ``pdf``) its paths.
 
         Raises:
-            UsageError: the package that makes PDFs is not installed.
+            UsageError: the package that makes PDFs is not installed, or ``path`` is such a file.
             OutputError: it cannot be written.
         """
-        write_named(Path(path), self.svg)
+        file = path_of(path)
+        if not overwrite:
+            check_output(file, overwrite=False)
+        write_named(file, self.svg)
 
     def __repr__(self) -> str:
         return f"Result({self._summary()})"
@@ -101,7 +109,12 @@ class Result:
     def _summary(self) -> str:
         """Return the figures in one line."""
         quality = "not measured" if self.score is None else f"{self.score.psnr:.2f} dB"
-        parts = [f"{len(self.scene)} shapes", quality, f"{len(self.svg.encode()):,d} bytes", self.subject]
+        parts = [
+            counted(len(self.scene), "shape"),
+            quality,
+            f"{len(self.svg.encode()):,d} bytes",
+            self.subject,
+        ]
         return ", ".join([*parts, f"{self.seconds:.1f} s", *(["stopped"] if self.stopped else [])])
 
     def _repr_svg_(self) -> str:
@@ -117,15 +130,19 @@ class Result:
     def as_dict(self) -> dict[str, Any]:
         """Return the figures for JSON; those that were not measured are None."""
         shapes = len(self.scene) - len(self.scene.pictures)
-        figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {"bytes": len(self.svg.encode())}
+        figures: dict[str, Any] = {f.name: None for f in fields(Score)} | {
+            "exact": None,
+            "bytes": len(self.svg.encode()),
+        }
         return {
             **(self.score.as_dict() if self.score else figures),
             "subject": self.subject,
             "why": self.why,
+            "device": self.device,
             "renderer": self.renderer,
-            "render_psnr": _finite(self.render_psnr),
+            "render_psnr": finite(self.render_psnr),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),
-            "estimated_psnr": _finite(self.estimated_psnr),
+            "estimated_psnr": finite(self.estimated_psnr),
             "shapes": shapes,
             "curves": shapes,  # an older name, kept for scripts
             "iterations": self.iterations,
@@ -138,7 +155,7 @@ class Result:
         }
 
 
-def _finite(decibels: float) -> float | None:
+def finite(decibels: float) -> float | None:
     """Return a PSNR for JSON, which has no other numbers than finite ones."""
     return round(decibels, 3) if math.isfinite(decibels) else None
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpsplat.drawing.trace.subject import guess_subject
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, shown
 from warpsplat.files.output import make_folder
+from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
@@ -31,7 +32,7 @@ MOST_NUMBERS = 16
 """Most numbers of shapes in one run."""
 
 
-OWN_NUMBER = {"line": "line drawing", "pixel": "picture of cells"}
+OWN_NUMBER = {"line": "line drawing", "pixel": "piece of pixel art"}
 """Subjects whose images decide how many shapes there are, as messages call them."""
 
 
@@ -44,7 +45,7 @@ def check_several(settings: Settings, numbers: Sequence[int]) -> None:
         if numbers.count(number) > 1:
             raise UsageError(f"curves: {number} is given twice")
     if settings.counting:
-        raise UsageError(f"several numbers of shapes and {settings.counting[0]} do not go together")
+        raise UsageError(f"several numbers of shapes and {settings.counting[0]} cannot be combined")
 
 
 @takes(Options)
@@ -80,6 +81,8 @@ def vectorize_several(
             as goals and levels do; line art and pixel art, which decide it themselves.
         ImageError, OutputError, ResourceError, TypeError: as for ``vectorize``.
     """
+    if not isinstance(curves, Sequence) or isinstance(curves, str):
+        raise UsageError(f"curves must be several numbers of shapes, not {shown(curves)}")
     if outputs is not None and len(outputs) != len(curves):
         raise UsageError(f"{len(curves)} numbers of shapes and {len(outputs)} outputs")
     settings = settings_given(vectorize_several, settings, **options)
@@ -90,10 +93,10 @@ def vectorize_several(
         subject = prepared.problem.settings.subject
         if subject in OWN_NUMBER:
             raise UsageError(
-                f"{prepared.name}: a {OWN_NUMBER[subject]} has a number of shapes of its own: one file is "
-                "all there is of it; --subject photo fits shapes"
+                f"{prepared.name}: the image itself decides how many shapes a {OWN_NUMBER[subject]} has, so "
+                "there is only one file; --subject photo fits shapes"
             )
-        paths = {number: Path(output) for number, output in zip(curves, outputs or (), strict=False)}
+        paths = {number: path_of(output) for number, output in zip(curves, outputs or (), strict=False)}
         for folder in sorted({path.parent for path in paths.values()}):
             make_folder(folder)
         results = _results(prepared, curves, Run(backend, callback, stop), paths, ready)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
-from warpsplat.errors import UsageError
+from warpsplat.errors import UsageError, counted
 from warpsplat.field_docs import described
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
@@ -69,7 +69,7 @@ class Expected:
     def __str__(self) -> str:
         """Return the beginning of a sentence."""
         size = f"{self.bytes / 1000:.0f} kB" if self.bytes >= 10_000 else f"{self.bytes / 1000:.1f} kB"
-        return f"{self.shapes} shapes are expected to give {self.psnr:.1f} dB in {size}"
+        return f"{counted(self.shapes, 'shape')} should give {self.psnr:.1f} dB in {size}"
 
 
 @described
@@ -190,7 +190,7 @@ def expect(worth: Worth, shapes: int) -> Expected:
 def reason(worth: Worth, chosen: int, more: str) -> str:
     """Return the reason for a number, from which on ``more`` gains less."""
     if worth.fewest == worth.most:
-        return f"The picture is so small that there is no room for more than {worth.most} shapes."
+        return f"The picture is so small that there is no room for more than {counted(worth.most, 'shape')}."
     one, two = expect(worth, chosen), expect(worth, 2 * chosen)
     if one.psnr > EXACT_PSNR:
         return f"{one}; more are expected to add nothing that can be seen."

@@ -5,10 +5,19 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import replace
-from pathlib import Path
 
 from warpsplat.errors import ImageError, naming
-from warpsplat.files.sources import BytesLike, ImageSource, Readable, image_of, source_bytes, source_name
+from warpsplat.files.remote import path_of
+from warpsplat.files.sources import (
+    FILE_PATHS,
+    BytesLike,
+    FilePath,
+    ImageSource,
+    Readable,
+    image_of,
+    source_bytes,
+    source_name,
+)
 from warpsplat.fit.export import export
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import make_settings
@@ -20,9 +29,9 @@ from warpsplat.svg.inspect import inspect_svg, svg_size, svg_text
 from warpsplat.svg.read import load_kept
 from warpsplat.svg.write import minified
 
-SvgSource = str | os.PathLike[str] | BytesLike | Readable
-"""An SVG: its text (a string with a ``<`` in it), its file's path, its bytes, or a file open for reading;
-gzipped or not."""
+SvgSource = FilePath | BytesLike | Readable
+"""An SVG: its text (a string with a ``<`` in it), its file's path or URL, its bytes, or a file open for
+reading; gzipped or not."""
 
 
 def load_svg(svg: SvgSource, *, keep: bool = False) -> Scene:
@@ -57,7 +66,7 @@ def save_svg(
 
     Args:
         scene: what to write.
-        path: its ending decides the format, see ``Result.save``.
+        path: its ending decides the format, see ``Result.save``; an existing file is replaced.
         precision: decimals of a pixel in coordinates; default: two.
         title: as for ``vectorize``.
         ids: as for ``vectorize``.
@@ -73,7 +82,7 @@ def save_svg(
     text = export(scene, settings, finest(settings))
     text = minified(text) if minify else text
     if path is not None:
-        write_named(Path(path), text)
+        write_named(path_of(path), text)
     return text
 
 
@@ -105,7 +114,7 @@ def text_of(svg: SvgSource, name: str) -> str:
         return svg
     if isinstance(svg, (str, bytes)) and not svg.strip():
         raise ImageError(f"{name}: is empty: give an SVG's text, its bytes, or the path of its file")
-    if not isinstance(svg, (str, os.PathLike, BytesLike, Readable)):
+    if not isinstance(svg, (*FILE_PATHS, BytesLike, Readable)):
         raise TypeError(f"an SVG is its text, a path, bytes or a file, not {type(svg).__name__}")
     return svg_text(source_bytes(svg, "an SVG"), name)
 

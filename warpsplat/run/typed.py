@@ -27,6 +27,7 @@ class Options(RefineOptions, total=False):
     The documentation's table explains them.
     """
 
+    preset: str | None
     subject: Subject | None
     closed: bool | None
     open: bool | None

@@ -7,10 +7,10 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpsplat.errors import DeviceError, UsageError, naming
+from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
@@ -68,8 +68,8 @@ def vectorize(
         curves: number of shapes; for drawings, and with a goal, the maximum.
         settings: all options at once, made by ``make_settings``; no further ones may be given then.
         importance: mask of the image's proportions, in any of the image's forms: how much errors count.
-        output: file to write the SVG to, before it is measured, or what its name ends with (``Result.save``);
-            ``-`` is the standard output.
+        output: file to write the SVG to, before it is measured, or what its name ends with; an existing one
+            is replaced (``Result.save(overwrite=False)`` would refuse); ``-`` is the standard output.
         device: ``auto``, ``cpu``, ``cuda`` or ``cuda:N``.
         threads: of the CPU, by default one per core; the result does not depend on them.
         callback: see ``Callback``.
@@ -104,7 +104,7 @@ def vectorize(
         settings = replace(settings, subject="photo")
     given_files = (image, importance, output)
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
-    write = None if output is None else functools.partial(write_named, Path(output))
+    write = None if output is None else functools.partial(write_named, path_of(output))
     with backend_on(device, threads) as backend:
         prepared = prepare(
             image, settings, name=name, importance=importance, loss=loss, keyed=keyed, backend=backend
@@ -171,6 +171,7 @@ def make_result(
             seconds=seconds,
             stopped=made.interrupted,
             renewed=made.renewed,
+            device=run.device_name,
             renderer=settings.renderer,
             render_ssim=render_ssim,
             missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.errors import counted
 from warpsplat.field_docs import described
 from warpsplat.forms import form_of
 from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
@@ -227,8 +228,9 @@ class Scene:
 
     def __repr__(self) -> str:
         strokes = int((self.kind == Kind.STROKE).sum())
-        parts = f"{len(self)} shapes, {strokes} of them strokes, {len(self.points)} points"
-        return f"Scene({self.canvas.width}x{self.canvas.height} px, {parts})"
+        shapes, points = counted(len(self), "shape"), counted(len(self.points), "point")
+        size = f"{self.canvas.width}x{self.canvas.height} px"
+        return f"Scene({size}, {shapes}, {strokes} of them strokes, {points})"
 
     @staticmethod
     def uniform(

@@ -199,7 +199,7 @@ def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: SvgV
         is_rect = style["visibility"] == "visible" and drawn and len(drawn[0].points) == 13
         if units == "userSpaceOnUse" and is_rect:
             return moved(matrix, drawn[0].points[:12:3])
-    raise ImageError("uses a clip-path that is no rectangle, not supported")
+    raise ImageError("uses a clip-path that is not a rectangle, which is not supported")
 
 
 def _content(element: Element, document: Document) -> Element | None:

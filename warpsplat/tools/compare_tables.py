@@ -8,6 +8,7 @@ from dataclasses import asdict
 from statistics import fmean
 
 from warpsplat._version import __version__
+from warpsplat.errors import counted
 from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
 
 Figures = dict[str, float | None]
@@ -79,11 +80,11 @@ def markdown(found: Comparison) -> str:
         parts += [f"## {image}", table([(row.program, row.setting, figures(row)) for row in rows])]
         parts += [f"{row.program}, {row.setting}: {row.error}" for row in rows if row.error]
     if len(images) > 1:
-        parts += [f"## Mean of {len(images)} images", table(means(found))]
+        parts += [f"## Mean of {counted(len(images), 'image')}", table(means(found))]
     ours, tracer = found.settings, found.tracer
     lines = [
-        f"* {OURS} {__version__}: the number of {ours.kind.name.lower()}s; {ours.iterations} steps, "
-        f"seed {ours.seed}",
+        f"* {OURS} {__version__}: the number of {ours.kind.name.lower()}s; "
+        f"{counted(ours.iterations, 'step')}, seed {ours.seed}",
         f"* {tracer.name} {tracer.version}, options other than the defaults:",
     ]
     for name, options in tracer.settings.items():

@@ -27,7 +27,7 @@ def with_gradient(function: Callable[..., Any], device: str) -> Callable[..., tu
             render = torch.tensor(image, device=place, requires_grad=True)
             value = function(render, *(torch.tensor(each, device=place) for each in target))
             if not isinstance(value, torch.Tensor):
-                raise UsageError(f"the loss returned {shown(value)}, which is no tensor and has no gradient")
+                raise UsageError(f"the loss returned {shown(value)}, which is not a tensor with a gradient")
             found = (
                 torch.autograd.grad(value.mean(), render, allow_unused=True) if value.requires_grad else ()
             )

@@ -50,7 +50,7 @@ def test_the_knee_is_marked(results: list[Result]) -> None:
     for one in (by_shapes, by_size):
         assert [mark.strong for mark in one.marks] == [False, True, False]
     text = several_page(versions, Image.new("RGB", (24, 16)), name="a.png", command="warpsplat ...")
-    assert "Of these, 4 shapes are at the knee: up to there a kB buys" in text
+    assert "The knee is at 4 shapes: up to there a kB buys" in text
     assert text.count("the knee</span>") == 1
     labels = [float(y) for y in re.findall(r'<circle class="mark[^>]*/>\s*<text [^>]*y="([\d.]+)"', text)]
     assert len(labels) == 6 and max(labels) < BOTTOM, "the axis has figures of its own below"

@@ -111,8 +111,8 @@ def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.Monkey
     ("settings", "said"),
     [
         ({"curves": "many"}, "curves must be a whole number from 1 to 100000, not 'many'"),
-        ({"subject": "drawing", "open": True}, "subject drawing and open do not go together"),
-        ({"closed": True, "open": True}, "closed and open do not go together"),
+        ({"subject": "drawing", "open": True}, "subject drawing and open cannot be combined"),
+        ({"closed": True, "open": True}, "closed and open cannot be combined"),
         ({"palette": "/etc/passwd"}, "unknown setting 'palette'; there are "),
     ],
 )

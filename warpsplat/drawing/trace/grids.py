@@ -180,4 +180,4 @@ def nearest_in(mask: Bools) -> Ints:
 
 
 def unchecked() -> None:
-    """Do nothing: what long work calls now and then if nobody may stop it."""
+    """Do nothing: the default for the check that long work makes so that it can be stopped."""

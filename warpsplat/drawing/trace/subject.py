@@ -11,6 +11,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, dilated, eroded
 from warpsplat.drawing.trace.lattice import CELLS, MOST_COLORS, find_lattice
 from warpsplat.drawing.trace.pixels import changes
+from warpsplat.errors import counted
 from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray
 
@@ -28,7 +29,7 @@ class Guess:
 
 TINY_PIXELS = 256
 TINY_SIDE, TINY_SIDE_PIXELS = 2, 1024
-"""Largest side and number of pixels at which an image counts as pixel art: cells are exact in few bytes."""
+"""Largest side and number of pixels at which an image counts as pixel art: exact cells take few bytes."""
 
 
 def guess_subject(image: FloatArray) -> Guess:
@@ -175,16 +176,16 @@ def _cells(image: FloatArray, counts: Ints) -> str | None:
     cell = int(np.gcd.reduce(np.concatenate([across, down])))
     sides = image.shape[0] // cell, image.shape[1] // cell
     if _is_sprite(_levels(image[::cell, ::cell])):
-        return f"{len(counts)} colours in cells of {cell}x{cell} px"
+        return f"{counted(len(counts), 'colour')} in cells of {cell}x{cell} px"
     if 2 <= len(counts) <= MOST_COLORS:
         if cell > 1:
             is_art = CELLS[0] <= min(sides) and max(sides) <= CELLS[1]
-            return f"{len(counts)} colours in cells of {cell}x{cell} px" if is_art else None
+            return f"{counted(len(counts), 'colour')} in cells of {cell}x{cell} px" if is_art else None
         frequent = counts[counts >= max(FREQUENT_PIXELS, FREQUENT * counts.sum())].sum()
         sizes = np.diff(across), np.diff(down)
         is_scaled = all(len(each) >= CELLS[0] and (each == 1).mean() < SINGLE for each in sizes)
         if is_scaled and frequent >= MOSTLY_FREQUENT * counts.sum() and not _is_antialiased(_levels(image)):
-            return f"{len(counts)} colours with hard edges"
+            return f"{counted(len(counts), 'colour')} with hard edges"
     lattice = find_lattice(_levels(image).astype(np.uint8))
     if lattice is None:
         return None

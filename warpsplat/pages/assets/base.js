@@ -2,6 +2,7 @@
 // Helpers of all pages.
 globalThis.warpsplat = {
   byId: (id) => document.getElementById(id),
+  counted: (number, word) => `${number} ${word}${Number(number) === 1 ? "" : "s"}`,
 
   // The data that the template wrote for the script.
   data: () => JSON.parse(document.getElementById("data").textContent),

@@ -7,7 +7,7 @@
   const OUTLINES = ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
   const GEOMETRY = ["d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "x1", "y1", "x2", "y2", "points"];
 
-  const { byId, node } = warpsplat;
+  const { byId, counted, node } = warpsplat;
   const { svg, view, listing, name } = warpsplat.data();
   const { viewer } = byId("viewer");
   const file = new DOMParser().parseFromString(svg, "image/svg+xml");
@@ -284,7 +284,7 @@
   };
   if (listing.background !== null) addLayer("background", "Background", "Behind all shapes");
   listing.names.forEach((text, layer) => {
-    addLayer(layer, text, `${listing.layers.filter((one) => one === layer).length} shapes`);
+    addLayer(layer, text, counted(listing.layers.filter((one) => one === layer).length, "shape"));
   });
 
   byId("count").textContent = String(count);

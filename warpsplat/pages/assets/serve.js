@@ -2,7 +2,7 @@
 // The page of `warpsplat serve`. With every change the server sends the whole state of this page's session, and what is
 // shown follows from it: after a reload the page is complete with the first message.
 (() => {
-  const { byId, node, data } = warpsplat;
+  const { byId, counted, node, data } = warpsplat;
   const facts = data();
   const STATES = { waiting: "Waiting", running: "Running", done: "Done", stopped: "Stopped", failed: "Failed" };
 
@@ -151,12 +151,12 @@
   function name({ number, values }) {
     const words = [
       values.subject,
-      values.curves && `${values.curves} shapes`,
+      values.curves && counted(values.curves, "shape"),
       values.open && "strokes",
       values.mixed && "fills and strokes",
       values.quality,
       values.paint && `${values.paint} paint`,
-      values.colors && `${values.colors} colours`,
+      values.colors && counted(values.colors, "colour"),
     ];
     return `${number} · ${words.filter(Boolean).join(", ") || "automatic"}`;
   }
@@ -170,7 +170,7 @@
     const { live } = run;
     if (run.stopping) return "Stopping, and measuring the file";
     const words = [`${Math.floor(100 * live.work)} %`];
-    if (live.shapes) words.push(`${live.shapes} shapes`);
+    if (live.shapes) words.push(counted(live.shapes, "shape"));
     if (live.psnr != null) words.push(`${live.psnr.toFixed(1)} dB${live.fine ? "" : " (reduced)"}`);
     if (live.left != null && live.left >= 1) words.push(`${clock(live.left)} left`);
     return live.note || words.join(" · ");
@@ -181,10 +181,10 @@
     return [(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0), "kB"];
   }
 
-  function figures({ figures: { psnr, ssim, bytes, shapes, seconds } }) {
+  function figures({ figures: { psnr, exact, bytes, shapes, seconds } }) {
     const rows = [];
     if (psnr != null) rows.push(["PSNR", psnr.toFixed(2), "dB"]);
-    else if (ssim === 1) rows.push(["PSNR", "exact", ""]);
+    else if (exact) rows.push(["PSNR", "exact", ""]);
     if (bytes != null) rows.push(["SVG", ...size(bytes)]);
     rows.push(["Shapes", shapes, ""]);
     rows.push(seconds < 60 ? ["Time", seconds.toFixed(1), "s"] : ["Time", clock(seconds), ""]);

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.errors import printable
+from warpsplat.errors import counted, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.pages.environment import page
 from warpsplat.pages.plot import Mark, Plot, plot
@@ -64,7 +64,7 @@ def several_page(versions: Sequence[Version], image: ImageSource, *, name: str, 
     cards = [
         {
             "key": f"version-{number}",
-            "label": f"{version.shapes:,} shapes".replace(",", "\N{THIN SPACE}"),
+            "label": f"{version.shapes:,} shape{'s' * (version.shapes != 1)}".replace(",", "\N{THIN SPACE}"),
             "file": printable(version.file),
             "knee": number == at,
             "figures": [one for one in headline(version.result.as_dict()) if one[0] != "Shapes"],
@@ -153,6 +153,6 @@ def _explanation(versions: Sequence[Version], at: int | None) -> str:
         1000 * (two.psnr - one.psnr) / (two.bytes - one.bytes) for one, two in ((before, here), (here, after))
     )
     return (
-        f"Of these, {here.shapes} shapes are at the knee: up to there a kB buys {bought:.2g} dB, "
+        f"The knee is at {counted(here.shapes, 'shape')}: up to there a kB buys {bought:.2g} dB, "
         f"beyond it {next_bought:.2g} dB."
     )

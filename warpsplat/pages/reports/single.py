@@ -9,7 +9,7 @@ from typing import Any
 
 from PIL import Image
 
-from warpsplat.errors import ImageError, printable
+from warpsplat.errors import ImageError, counted, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.progress import Progress
 from warpsplat.pages.environment import page
@@ -184,7 +184,7 @@ def table(facts: Facts, shown: ShownImage) -> list[tuple[str, str]]:
 def _value(figures: object, key: str, form: str) -> str | None:
     """Return a figure as text; None if it is missing. A manifest may contain anything."""
     value = figures.get(key) if isinstance(figures, Mapping) else None
-    if key == "psnr" and value is None and isinstance(figures, Mapping) and figures.get("ssim") == 1:
+    if key == "psnr" and isinstance(figures, Mapping) and figures.get("exact") is True:
         return EXACT
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return None
@@ -197,13 +197,14 @@ def notes(facts: Facts) -> list[str]:
     figures = facts.figures
     found = []
     if figures.get("stopped"):
-        found.append(
-            f"The run was stopped after {figures.get('iterations', 0)} steps: this is the result so far."
-        )
+        steps = counted(figures.get("iterations", 0), "step")
+        found.append(f"The run was stopped after {steps}: this is the result so far.")
     if figures.get("reduced"):
         found.append(f"{figures['reduced']}.")
     if figures.get("renewed"):
-        found.append(f"{figures['renewed']} times shapes had numbers that were not finite, and were reset.")
+        found.append(
+            f"Shapes with numbers that were not finite were reset, {counted(figures['renewed'], 'time')}."
+        )
     if facts.kept:
         found.append(f"Kept unchanged: {facts.kept}.")
     missed = figures.get("missed")
@@ -219,7 +220,7 @@ def levels(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
         count, psnr = _value(level, "shapes", ",d"), _value(level, "psnr", ".2f")
         if count is not None:
             psnr = EXACT if psnr is None else f"{psnr}\N{NO-BREAK SPACE}dB"
-            found.append((f"The first {count} shapes", psnr))
+            found.append((f"The first {count} shape{'s' * (count != '1')}", psnr))
     return found
 
 

@@ -10,7 +10,7 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.options import threads_option
-from warpsplat.errors import UsageError, shown
+from warpsplat.errors import UsageError, counted, shown
 from warpsplat.extensions import renderer_names
 
 
@@ -36,11 +36,14 @@ def table(values: dict[str, Any], verbose: int) -> str:
     rows += [(f"alternately, {name}", torch[name]) for name in ("own", "torch") if torch]
     memory = values["peak_memory"]
     where = values["device"] + (
-        f", {values['threads']} threads" if values["device"] == "cpu" else f" ({values['device_name']})"
+        f", {counted(values['threads'], 'thread')}"
+        if values["device"] == "cpu"
+        else f" ({values['device_name']})"
     )
     return "\n".join(
         [
-            f"{values['shapes']} {values['kind']} shapes, {values['width']}x{values['height']} px, "
+            f"{values['kind']}, {counted(values['shapes'], 'shape')}, "
+            f"{values['width']}x{values['height']} px, "
             f"opacity {values['opacity']:g}, {values['renderer']} renderer, {where}",
             f"{values['pairs']} (tile, shape) pairs, {values['samples']} samples",
             f"{'':36}{'median':>10}{'low':>10}{'high':>10}  ms",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import FILE, flag, overwrite_option, run_options
+from warpsplat.cli.options import INPUT, flag, overwrite_option, run_options
 from warpsplat.errors import Stopped, UsageError, printable, shown
 from warpsplat.run.options import BY_NAME, settings_from
 from warpsplat.tools.tracer import TRACERS
@@ -87,7 +87,7 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
 
 
 @click.command("compare", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("images", nargs=-1, required=True, type=FILE)
+@click.argument("images", nargs=-1, required=True, type=INPUT)
 @click.option("--against", type=click.Choice(list(TRACERS)), required=True, help="The other program.")
 @click.option(
     "-o",

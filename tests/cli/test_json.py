@@ -1,0 +1,68 @@
+"""The objects of ``--json``: the same figures by every command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.helpers import MANIFEST, QUICK, run
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    cells = np.random.default_rng(0).integers(0, 2, (12, 12, 1), dtype=np.uint8).repeat(3, 2) * 255
+    Image.fromarray(cells).save("cells.png")
+    noise = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    Image.fromarray(noise).save("noise.png")
+
+
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]) -> Any:
+    def printed(*words: object) -> Any:
+        capsys.readouterr()
+        assert run(*words, "--json") == 0
+        return json.loads(capsys.readouterr().out.splitlines()[0], parse_constant=pytest.fail)
+
+    return printed
+
+
+def test_an_exact_file(printed: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("vectorize", "cells.png", "--subject", "pixel") == 0
+    found = [
+        printed("vectorize", "cells.png", "--subject", "pixel"),
+        printed("eval", "cells.png", "cells.svg"),
+        printed("batch", "cells.png", "--subject", "pixel", "-o", "out"),
+        printed("batch", "cells.png", "--subject", "pixel", "-o", "out"),  # skipped: from the manifest
+        json.loads(Path("out", MANIFEST).read_text().splitlines()[0])["figures"],
+    ]
+    assert all(each["exact"] is True and each.get("psnr") is None for each in found)
+    again = printed("refine", "cells.svg", "cells.png", "-o", "b.svg", "--iterations", 1, "--device", "cpu")
+    assert (again["psnr_before"], again["psnr"], again["exact"]) == (None, None, True)
+    capsys.readouterr()
+    assert run("eval", "cells.png", "cells.svg") == 0
+    assert capsys.readouterr().out.splitlines()[0].split() == ["psnr", "exact"]
+
+
+def test_a_file_that_is_not_exact(printed: Any) -> None:
+    made = printed("vectorize", "noise.png", *QUICK)
+    assert made["exact"] is False and made["psnr"] > 5
+
+
+@pytest.mark.parametrize("command", ["vectorize", "refine", "several", "batch"])
+def test_the_device_that_was_used(printed: Any, command: str, device: str) -> None:
+    """``auto`` is no device."""
+    effort = ["--iterations", 2]
+    if command == "refine":
+        assert run("vectorize", "noise.png", *QUICK) == 0
+        words = ["refine", "noise.svg", "noise.png", "-o", "b.svg", *effort]
+    else:
+        words = ["batch" if command == "batch" else "vectorize", "noise.png", *effort]
+        words += ["--curves", "4,8" if command == "several" else "4"]
+    found = printed(*words)
+    assert (found[0] if command == "several" else found)["device"] == device
