@@ -91,6 +91,15 @@ def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_pa
     assert sorted((outcome.number, outcome.status) for outcome in found) == [(0, "stopped"), (1, "stopped")]
 
 
+def test_what_has_begun_is_not_killed_though_that_was_not_received_yet(tmp_path: Path) -> None:
+    worker = pool.WorkerProcess(1)
+    worker.give(tasks(tmp_path, "wait")[0])
+    assert worker.channel.poll(60)
+    worker.stop()
+    assert [worker.channel.recv() for _ in range(2)][1].status == "stopped"
+    worker.end()
+
+
 def test_what_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "GRACE", 0.1)
     begun: list[int] = []

@@ -261,17 +261,22 @@ def test_stop_ends_tasks_with_the_best_so_far_or_without(
 
 def test_an_actor_answers_while_it_works(tasks: list[Task], monkeypatch: pytest.MonkeyPatch) -> None:
     actor = ray_worker.Actor()
-    actor.stop()  # meant for an earlier task
+    actor.stop(tasks[0].number + 1)
 
     def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
         assert not stop()
         on_progress(task.number, 0.25)
         assert actor.done() == 0.25
-        actor.stop()
+        actor.stop(task.number)
         return Outcome(task.number, "stopped" if stop() else "made")
 
     monkeypatch.setattr(work, "do", do)
     assert actor.do(tasks[0]).status == "stopped"
+    monkeypatch.setattr(
+        work, "do", lambda task, stop, _: Outcome(task.number, "stopped" if stop() else "made")
+    )
+    assert actor.do(tasks[0]).status == "stopped", "also if that came before it began"
+    assert actor.do(tasks[1]).status == "made"
 
 
 # Connecting.

@@ -17,12 +17,16 @@ from collections.abc import Iterator
 from logging.handlers import QueueHandler
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerContext, SpawnContext
 
 from warpsplat.batch.executors.tasks import OnProgress, Outcome, Task
 from warpsplat.batch.executors.workers import WorkerExecutor
 from warpsplat.errors import ResourceError
 
 log = logging.getLogger("warpsplat")
+
+CONTEXT: SpawnContext | ForkServerContext = multiprocessing.get_context("spawn")
+"""How processes are started: on every version of Python the same way."""
 
 POLL = 0.1
 """Seconds between two calls of ``stop``."""
@@ -42,10 +46,9 @@ class WorkerProcess:
 
     def __init__(self, workers: int) -> None:
         """Start a process; ``workers``: how many there will be."""
-        context = multiprocessing.get_context("spawn")
-        self.channel, other = context.Pipe()
+        self.channel, other = CONTEXT.Pipe()
         arguments = (other, log.getEffectiveLevel(), workers)
-        self.process = context.Process(target=do_tasks, args=arguments, name="warpsplat worker")
+        self.process = CONTEXT.Process(target=do_tasks, args=arguments, name="warpsplat worker")
         with _signals_blocked():
             self.process.start()
         other.close()
@@ -65,7 +68,7 @@ class WorkerProcess:
 
     def stop(self) -> None:
         """See ``TaskWorker``."""
-        if self.begun:
+        if self.begun or wait([self.channel], 0):  # what is not received yet may say that it has begun
             self._send(STOP)
         else:
             self.process.kill()
@@ -167,6 +170,8 @@ def do_tasks(channel: Connection, level: int, workers: int) -> None:
         level: level of the log records that the parent shows.
         workers: how many processes share the machine.
     """
+    for number in (signal.SIGINT, signal.SIGTERM):  # where they could not be blocked
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     log.addHandler(_Forward(channel))  # type: ignore[arg-type]
     log.propagate = False

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import platform
-import threading
 from collections.abc import Mapping
 from dataclasses import replace
 from types import ModuleType
@@ -21,7 +20,7 @@ class Actor:
     """A process of the cluster: does a task in one thread, and answers in another one meanwhile."""
 
     def __init__(self) -> None:
-        self._stop = threading.Event()
+        self._stopped = -1  # number of the task that is to end
         self._done = 0.0
 
     def hello(self) -> tuple[str, str]:
@@ -32,17 +31,16 @@ class Actor:
         """Do a task."""
         from warpsplat.batch.executors.work import do  # heavy, and hello is to be quick
 
-        self._stop.clear()
         self._done = 0.0
 
         def on_progress(number: int, fraction: float) -> None:
             self._done = fraction
 
-        return do(task, self._stop.is_set, on_progress)
+        return do(task, lambda: self._stopped == task.number, on_progress)
 
-    def stop(self) -> None:
-        """End the task in progress with the best so far."""
-        self._stop.set()
+    def stop(self, number: int) -> None:
+        """End a task with the best so far, or as soon as it begins."""
+        self._stopped = number
 
     def done(self) -> float:
         """Return the fraction of the task in progress that is done."""
@@ -106,7 +104,8 @@ class RayWorker:
 
     def stop(self) -> None:
         """See ``TaskWorker``."""
-        self._actor.stop.remote()
+        if self.task:
+            self._actor.stop.remote(self.task.number)
 
     def end(self) -> None:
         """See ``TaskWorker``."""

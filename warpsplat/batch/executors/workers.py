@@ -13,8 +13,9 @@ from warpsplat.errors import ResourceError, printable
 
 log = logging.getLogger("warpsplat")
 
-GRACE = 10.0
-"""Seconds that tasks have to end after they are asked to stop: for a step, and returning the file."""
+GRACE = 60.0
+"""Seconds that tasks have to end after they are asked to: to compile kernels, for a step, and for the file.
+A second signal does not wait."""
 
 MOST_STILLBORN = 3
 """After so many workers in a row that are lost before they respond, no more are started."""
