@@ -21,20 +21,12 @@ from warpsplat.errors import ExitCode, counted, printable
 from warpsplat.extensions import load_renderer
 from warpsplat.files.inputs import input_name
 from warpsplat.fit.progress import Progress, TimeLeft
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import SUBJECTS, Settings
 from warpsplat.run.arguments import ALWAYS_THERE
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
-
-SUBJECTS = {
-    "photo": "photograph",
-    "drawing": "drawing",
-    "line": "line drawing",
-    "pixel": "piece of pixel art",
-}
-"""Subjects as messages call them."""
 
 BAR_LENGTH = 1000
 """Units of the progress bar, each a thousandth of the work."""
@@ -136,9 +128,16 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
 
 
 def echo_exceptions(name: str, result: Result) -> None:
-    """Print which elements were kept, how the image was reduced, and how many shapes were reset, if any."""
+    """Print what the run noted, which elements were kept, how the image was reduced, and how many shapes were
+    reset, if any.
+    """
     reset = f"shapes with numbers that are not finite were reset, {counted(result.renewed, 'time')}"
-    notes = (result.kept and f"kept as it is: {result.kept}", result.reduced, result.renewed and reset)
+    notes = (
+        *result.notes,
+        result.kept and f"kept as it is: {result.kept}",
+        result.reduced,
+        result.renewed and reset,
+    )
     for note in filter(None, notes):
         echo(f"warpsplat: {name}: {note}", err=True)
 

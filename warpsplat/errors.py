@@ -132,8 +132,8 @@ def cause_of(error: BaseException) -> str:
 
 
 def counted(number: int, word: str) -> str:
-    """Return ``1 path`` or ``2 paths``."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+    """Return ``1 path``, ``2 paths`` or ``2,000 paths``."""
+    return f"{number:,} {word}" if number == 1 else f"{number:,} {word}s"
 
 
 def printable(text: str) -> str:

@@ -13,6 +13,7 @@ from PIL import Image
 
 import warpsplat
 from tests.cli.helpers import QUICK, one_line, run, shell
+from tests.drawing.trace.drawings import LOGO, draw, ground
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.svg.numbers import data_uri
@@ -126,3 +127,22 @@ def test_data_uri(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
     shown = capsys.readouterr()
     assert shown.out.strip() == data_uri(output.read_text())
     assert "dB" in shown.err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--loss", "edges"], "loss edges has no effect on a drawing"),
+        (["--shape", "circle"], "shape circle asks for fitted shapes"),
+    ],
+)
+def test_a_line_says_what_an_option_does_to_a_drawing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    path = tmp_path / "logo.png"
+    Image.fromarray(np.round(255 * draw(ground("#fff") + LOGO)[..., :3]).astype(np.uint8)).save(path)
+    assert (
+        run("vectorize", path, "-o", tmp_path / "a.svg", *options, "--quality", "draft", "--curves", "8") == 0
+    )
+    lines = capsys.readouterr().err.splitlines()
+    assert [said in line for line in lines].count(True) == 1

@@ -118,7 +118,7 @@ def test_a_size_leaves_drawings_what_they_are() -> None:
         cv2.circle(
             image, (25 + 45 * (i % 4), 40 + 80 * (i // 4)), 15 + i, (0.1 * i, 0.5, 0.9), -1, cv2.LINE_AA
         )
-    settings, why = choose_subject(image, make_settings(max_bytes="1KB"))
+    settings, why, _ = choose_subject(image, make_settings(max_bytes="1KB"))
     assert settings.subject == "drawing" and why
-    settings, why = choose_subject(image, make_settings(target_psnr=30.0))
+    settings, why, _ = choose_subject(image, make_settings(target_psnr=30.0))
     assert settings.subject == "photo" and "target-psnr" in why

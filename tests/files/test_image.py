@@ -219,3 +219,21 @@ def test_float_maps_are_of_0_to_1_and_of_numbers(tmp_path: Path) -> None:
     path.write_bytes(b"Pf\n4 3\n-1.0\n" + grey[::-1].tobytes())
     with pytest.raises(ImageError, match="1 of 12 pixels are not finite numbers"):
         load_image(path)
+
+
+def test_opacity_that_a_file_does_not_use(tmp_path: Path) -> None:
+    """Writers of 32 bits a pixel may leave the last eight of them 0, or anything."""
+    clear = Image.fromarray(np.dstack([RGB, np.zeros_like(RGB[..., 0])]))
+    seen = clear.copy()
+    seen.putpixel((0, 0), (*RGB[0, 0].tolist(), 128))
+    for name in ("a.tga", "a.bmp"):
+        np.testing.assert_allclose(
+            load_image(save(tmp_path, clear, name)) * 255, RGB, atol=1e-4, err_msg=name
+        )
+    assert (load_image(save(tmp_path, clear, "a.png")) == 1).all(), "the opacity of a PNG is meant"
+    undeclared = bytearray(save(tmp_path, seen, "b.tga").read_bytes())
+    undeclared[17] &= 0xF0
+    for data, wanted in ((bytes(undeclared), RGB[0, 1]), (save(tmp_path, seen, "c.tga").read_bytes(), 255)):
+        path = tmp_path / "d.tga"
+        path.write_bytes(data)
+        np.testing.assert_allclose(load_image(path)[0, 1] * 255, wanted, atol=1e-4)

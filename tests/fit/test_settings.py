@@ -83,7 +83,10 @@ def test_density_may_be_given_in_part() -> None:
         ({"mixed": True, "open": True}, "mixed and open cannot be combined"),
         ({"mixed": True, "renderer": "splat"}, "mixed and the renderer splat cannot be combined"),
         ({"subject": "drawing", "open": True}, "subject drawing and open cannot be combined"),
-        ({"subject": "drawing", "paint": "auto"}, "subject drawing and paint auto cannot be combined"),
+        (
+            {"subject": "drawing", "loss": "edges"},
+            "subject drawing and loss edges cannot be combined; loss edges",
+        ),
         ({"subject": "line", "max_bytes": 900}, "subject line and max-bytes cannot be combined"),
         ({"levels": "5,x"}, "levels must be numbers of shapes"),
         ({"levels": "5,5"}, "levels must be ascending numbers of shapes"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +56,18 @@ def test_arguments_go_where_their_names_are(device: str, threads: int) -> None:
         program.launch(affine, 3, *sources, split=True, **values)
         program.run()
         np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
+
+
+def test_arrays_live_as_long_as_the_program(device: str) -> None:
+    """Recorded launches hold their addresses only."""
+    program, result = Program(wp.get_device(device)), floats(0, 0, 0, device=device)
+    shift, slope = (floats(*x, device=device) for x in ([10, 20, 30], [1, 2, 3]))
+    alive = weakref.ref(slope)
+    program.launch(affine, 3, shift=shift, slope=slope, factor=2.0, result=result)
+    del shift, slope
+    assert alive()
+    program.run()
+    np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
 
 
 COMPLETE: dict[str, Any] = {"slope": 1, "shift": 2, "factor": 3, "result": 4}

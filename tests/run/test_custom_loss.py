@@ -233,7 +233,10 @@ def test_a_fault_is_one_clear_line(fault: str) -> None:
     [
         ({"loss": CustomLoss(slopes), "subject": "drawing"}, "subject drawing and a loss function"),
         ({"loss": "edgy"}, "loss must be one of l2, ssim, edges, not 'edgy'"),
-        ({"loss": "ssim", "image": CLEAR}, "loss ssim needs an image without transparency"),
+        (
+            {"loss": "ssim", "image": CLEAR, "subject": "photo"},
+            "loss ssim needs an image without transparency",
+        ),
         ({"loss": "edges", "subject": "pixel"}, "subject pixel and loss edges cannot be combined"),
     ],
 )

@@ -86,7 +86,6 @@ WRONG: list[tuple[type[Exception], str, Callable[[], Any]]] = [
     (ValueError, "a canvas of 0x64 px has no pixel", lambda: Canvas(0, 64, None)),
     # Options
     (UsageError, "renderer must be one of exact.*, not 'fast'", drawn(renderer="fast")),
-    (ValueError, "is a spline", drawn(renderer="splat")),
     (UsageError, "threads must be a whole number from 1, not 'a'", drawn(threads="a")),
     (UsageError, "threads must be a whole number from 1, not 0", drawn(threads=0)),
     (UsageError, "threads must be a whole number from 1, not -1", drawn(threads=-1)),

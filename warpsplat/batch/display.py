@@ -14,8 +14,9 @@ import click
 from warpsplat.batch.results import MOST_NAMES
 from warpsplat.batch.run import JobOutcome
 from warpsplat.cli.echo import echo
-from warpsplat.cli.run import SUBJECTS, summary
+from warpsplat.cli.run import summary
 from warpsplat.errors import counted, printable
+from warpsplat.fit.settings import SUBJECTS
 from warpsplat.run.formats import is_picture
 
 CLEAR = "\r\x1b[2K"
@@ -172,4 +173,4 @@ def line(outcome: JobOutcome) -> str:
         return f"{name}: stopped, not made"
     subject = figures["subject"]
     taken = f", taken for a {SUBJECTS[subject]}" if figures["why"] and subject != "photo" else ""
-    return summary(output, dict(figures)) + taken
+    return "; ".join([summary(output, dict(figures)) + taken, *figures.get("notes", ())])

@@ -21,11 +21,12 @@ from warpsplat.fit.export import finished
 from warpsplat.fit.palette import Palette, solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
-from warpsplat.fit.settings import Settings, solid_color
+from warpsplat.fit.settings import Painting, Settings, solid_color
 from warpsplat.metrics import psnr_of_file
 from warpsplat.portable import elementary
 from warpsplat.portable.filters import boxed
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import FloatArray, Paint, Scene
+from warpsplat.scene.attributes import GRADIENTS
 from warpsplat.scene.geometry import enlarged
 
 LEAST_ORIGINAL_SIDE = 96
@@ -43,6 +44,14 @@ QUICK_PIXELS, QUICK_SECONDS = 131_072, 1.0
 DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
 
+
+DRAWN_GRADIENTS: dict[Painting, tuple[Paint, ...]] = {
+    "flat": (),
+    "linear": (Paint.LINEAR,),
+    "radial": (Paint.RADIAL,),
+    "auto": GRADIENTS,
+}
+"""Kinds of gradients that a drawing may have, where they are worth their bytes, by ``paint``."""
 
 USUAL_DETAIL = 0.5
 """``detail`` from which on letters are not given up."""
@@ -106,7 +115,8 @@ def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: 
 
     def traced(factor: int, check: Callable[[], None]) -> Traced:
         small = boxed(image, factor) if factor > 1 else image
-        found = trace(small, most=most, price=byte_price(settings), check=check)
+        price, gradients = byte_price(settings), DRAWN_GRADIENTS[settings.paint or "auto"]
+        found = trace(small, most=most, price=price, check=check, gradients=gradients)
         return replace(found, scene=enlarged(found.scene, factor, width, height))
 
     least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))

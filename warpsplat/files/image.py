@@ -51,6 +51,9 @@ STRIP_PIXELS = 1 << 20
 WEBP_SIDE = 16_383
 """Longest side of a WebP [px]: its header has 14 bits for it."""
 
+TGA_DESCRIPTOR, TGA_ATTRIBUTE_BITS = 17, 0x0F
+"""Byte of a TGA's header, and those of its bits that count the bits of opacity of a pixel."""
+
 LEVELS = {"1": 255, "L;2": 85, "L;4": 17}
 """Factors by which Pillow scales samples of PNGs with fewer than 8 bits; it does not scale their transparent
 grey."""
@@ -77,7 +80,7 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
             image.load()
             _fix_transparency(image, rawmode, source)
             ImageOps.exif_transpose(image, in_place=True)
-            yield image, left
+            yield _without_unused_alpha(image, source), left
     except ImageError as error:
         raise ImageError(f"{name}: {error}") from None
     except MemoryError:
@@ -150,6 +153,19 @@ def _fix_transparency(image: Image.Image, rawmode: str, data: bytes) -> None:
             raise ImageError("16-bit colours with a transparent one cannot be read")
         del image.info["transparency"]
         image.putalpha(Image.fromarray(np.where(deep[..., 3] == 0, 0, 255).astype(np.uint8)))
+
+
+def _without_unused_alpha(image: Image.Image, data: bytes) -> Image.Image:
+    """Return an image without a channel of opacity that its writer left unused, as viewers show it.
+
+    In these formats samples of 32 bits need not mean that there is opacity.
+    """
+    if image.format not in {"TGA", "BMP", "ICO"} or image.mode not in {"RGBA", "LA"}:
+        return image
+    undeclared = image.format == "TGA" and data[TGA_DESCRIPTOR] & TGA_ATTRIBUTE_BITS == 0
+    if undeclared or image.getchannel("A").getextrema() == (0, 0):
+        return image.convert(image.mode.removesuffix("A"))
+    return image
 
 
 def _draft(image: Image.Image, factor: int) -> int:

@@ -36,7 +36,7 @@ def densify(step: Step, *, grows: bool) -> Step:
     settings, state = step.settings, step.state
     step.renderer.forward_complete()
     costs = step.objective.quadratic().removal_costs()
-    if settings.paint != "flat" and repaints_at(settings, state.step):
+    if settings.painting != "flat" and repaints_at(settings, state.step):
         choose_paints(step)
     scene = state.scene()
     wanted = state.base + shapes_at(settings, state.step) if grows else len(scene)

@@ -14,7 +14,7 @@ import re
 import types
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeGuard, Union, get_args, get_origin, get_type_hints
 
 from warpsplat.errors import UsageError, shown
 
@@ -36,6 +36,12 @@ QUOTED = "in quotes, as an unquoted # begins a comment"
 """How shells and YAML files want colours, for messages."""
 
 
+Elsewhere = Literal["refused", "ignored", "fitted"]
+"""What becomes of an option that has no effect on a subject: if the user gave the subject, it is an error, or
+the option is ignored, which a note says. Of a subject that was detected it is ignored as well, unless the
+option asks for fitted shapes: then the image is fitted as a photograph, which a note says."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Option:
     """A setting as it is given. What a declaration leaves out follows from the field's type and default."""
@@ -54,7 +60,8 @@ class Option:
     pattern: str = ".*"  # regular expression for a text, which "wanted" describes
     wanted: str = ""  # values that are accepted, in words
     metavar: str = ""
-    subjects: tuple[str, ...] = ()  # that it is for, if not for all
+    subjects: tuple[str, ...] = ()  # that it has an effect on, if not on all
+    elsewhere: Elsewhere = "refused"
     parse: Callable[[Any], Any] | None = None  # makes a value of what users write: times, sizes, lists
     shorthands: tuple[Option, ...] = ()  # further options that set the field
 
@@ -143,7 +150,7 @@ def options_of(declaring: type) -> tuple[Option, ...]:
     found = []
     for field in dataclasses.fields(declaring):
         kind, choices = hints[field.name], ()
-        if get_origin(kind) is types.UnionType:
+        if get_origin(kind) in (types.UnionType, Union):
             kind = get_args(kind)[0]  # the other one is None
         if get_origin(kind) is Literal:
             kind, choices = str, get_args(kind)

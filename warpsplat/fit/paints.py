@@ -41,7 +41,7 @@ def choose_paints(step: Step) -> None:
     solver = RampSolver(step)
     scene = solver.scene
     min_gain = 0.0
-    if settings.paint == "auto":
+    if settings.painting == "auto":
         size = len(export(scene, settings, min(USUAL_GRID, finest(settings))))
         min_gain = GRADIENT_BYTES * byte_worth(step.objective.value(), size)
     surplus = state.step > settings.density.thin * settings.iterations
@@ -60,10 +60,10 @@ def _best_ramps(settings: Settings, solver: RampSolver, min_gain: float) -> tupl
     """Return the kind and the best ramp of each shape; where the gain is below ``min_gain``, any."""
     count = len(solver.scene)
     linear = solver.linear()
-    if settings.paint == "linear":
+    if settings.painting == "linear":
         return np.full(count, Paint.LINEAR, np.int32), linear
     radial = solver.radial(min_gain)
-    if settings.paint == "radial":
+    if settings.painting == "radial":
         return np.full(count, Paint.RADIAL, np.int32), radial
     chosen = radial.gain > RADIAL_ADVANTAGE * linear.gain
     both = [(getattr(radial, f.name), getattr(linear, f.name)) for f in fields(Ramps)]

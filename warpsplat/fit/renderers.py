@@ -7,7 +7,7 @@ from warpsplat.extensions import load_renderer
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.models import EXACT as EXACT_MODEL
 from warpsplat.rendering.models import ExactModel, Model
-from warpsplat.scene import IndexArray, Scene
+from warpsplat.scene import FloatArray, IndexArray, Scene
 
 
 class FitRenderer:
@@ -43,6 +43,13 @@ class FitRenderer:
     def drawable(self, scene: Scene) -> Scene:
         """Return any scene in a form that this renderer can draw; ``ValueError`` names what it cannot."""
         return scene
+
+    def weights(self, scene: Scene) -> list[FloatArray]:
+        """Return, by shape, the weights of its points in the points of ``drawable``: shape (new, old).
+
+        Empty: it draws the scene as it is. Raises ``ValueError`` as ``drawable``.
+        """
+        return []
 
     def split(self, scene: Scene, keep: IndexArray, most: int) -> tuple[IndexArray, Scene]:
         """Replace up to ``most`` of the shapes ``keep`` by two each; return those left, and the new ones."""

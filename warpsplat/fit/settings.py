@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,14 @@ Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 LossName = Literal["l2", "ssim", "edges"]
 
+SUBJECTS = {
+    "photo": "photograph",
+    "drawing": "drawing",
+    "line": "line drawing",
+    "pixel": "piece of pixel art",
+}
+"""Subjects as messages call them."""
+
 LOSS_WEIGHTS: dict[LossName, float] = {"l2": 0.0, "ssim": 0.005, "edges": 3.0}
 """Weights of what joins the squared error."""
 
@@ -53,6 +61,9 @@ PRESETS: dict[Quality, dict[str, Any]] = {
 }
 """Changes of the defaults by quality."""
 
+OF_PRESETS = {name for preset in PRESETS.values() for name in preset} - {"iterations"}
+"""Settings that only these change: the number of steps may be given besides."""
+
 QUALITIES: tuple[Quality, ...] = tuple(PRESETS)
 
 DEFAULT_QUALITY: Quality = "balanced"
@@ -63,8 +74,14 @@ FRACTION = (0.0, 1.0)
 
 WEIGHT = (0.0, 1e6)
 
-FITTED: tuple[Subject, ...] = ("auto", "photo")
-"""Subjects of options that only fitted shapes have a use for."""
+FITTED: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "fitted"}
+"""Of options that ask for fitted shapes."""
+
+TUNING: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "ignored"}
+"""Of options that change how well shapes are fitted."""
+
+DRAWN: dict[str, Any] = {"subjects": ("drawing",), "elsewhere": "ignored"}
+"""Of options that change how drawings are traced."""
 
 
 LEVEL_FACTOR, LEAST_LEVEL_SHAPES = 4, 8
@@ -154,6 +171,14 @@ class Density:
         check_fields(self, "density ")
 
 
+class Given(NamedTuple):
+    """An option that was given."""
+
+    name: str
+    """As users name it, with its value where that is a word."""
+    option: Option
+
+
 @described
 @dataclass(frozen=True)
 class Settings:
@@ -164,13 +189,15 @@ class Settings:
         "Number of shapes; with a goal, the maximum.",
         (1, 100_000),
         shown_default="512; fewer for a simple image",
+        subjects=("photo", "drawing"),
+        elsewhere="ignored",
     )
     subject: Subject = option(
         "auto", "Kind of image: photos are fitted with shapes, the other kinds are traced."
     )
     kind: Kind = option(
         Kind.FILL,
-        subjects=FITTED,
+        **FITTED,
         shorthands=(
             Option(name="closed", type=bool, help="Filled shapes.", shown_default="yes", value=Kind.FILL),
             Option(name="open", type=bool, help="Strokes.", value=Kind.STROKE),
@@ -183,18 +210,21 @@ class Settings:
         pattern=f"{CURVE}|{'|'.join(FORMS)}|polygon:({POLYGON_CORNERS})",
         wanted=f"one of {', '.join((CURVE, *FORMS))}, or polygon:N with 3 to 64 corners",
         metavar="FORM",
-        subjects=FITTED,
+        **FITTED,
     )
     mixed: bool = option(
         False,
         "Fills and strokes together, whichever suits better; in line art, fills for filled areas.",
-        subjects=(*FITTED, "line"),
+        subjects=("photo", "line"),
+        elsewhere="fitted",
     )
     iterations: int = option(
         1000,
         "Number of steps, instead of that of --quality.",
         (1, 1_000_000),
         shown_default="",
+        subjects=("photo", "line"),
+        elsewhere="ignored",
         shorthands=(
             Option(
                 name="quality", help="Effort: how many steps.", default=DEFAULT_QUALITY, choices=QUALITIES
@@ -204,24 +234,26 @@ class Settings:
     renderer: str = option(
         "exact",
         "How a fit renders shapes: as viewers do, as Gaussians close to that, or as the paper's soft ones.",
-        subjects=FITTED,
+        **FITTED,
         choices=renderer_names(),
     )
-    paint: Painting = option(
-        "flat",
-        "A flat colour for each shape, a gradient, or whichever is worth its bytes.",
-        subjects=FITTED,
+    paint: Painting | None = option(
+        None,
+        "Flat colours, one kind of gradient, or whichever is worth its bytes.",
+        shown_default="flat for photos, auto for drawings",
+        subjects=("photo", "drawing"),
+        elsewhere="ignored",
     )
     loss: LossName = option(
         "l2",
         "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
-        subjects=FITTED,
+        subjects=("photo",),
         refine=True,
     )
     levels: tuple[int, ...] = option(
         (),
         "Total number of shapes after each level, such as 64,256,1024.",
-        subjects=FITTED,
+        **FITTED,
         metavar="N,N",
         parse=parse_levels,
         shorthands=(
@@ -239,9 +271,9 @@ class Settings:
         metavar="COLORS",
         parse=parse_palette,
     )
-    opaque: bool = option(False, "No translucent shapes.")
+    opaque: bool = option(False, "No translucent shapes.", **TUNING)
     target_psnr: float | None = option(
-        None, "Make the smallest file with a PSNR of at least DB.", subjects=FITTED, metavar="DB"
+        None, "Make the smallest file with a PSNR of at least DB.", **FITTED, metavar="DB"
     )
     time_budget: float | None = option(
         None,
@@ -253,7 +285,8 @@ class Settings:
     max_bytes: int | None = option(
         None,
         "Make the best file of at most this size, such as 100KB or 1MB.",
-        subjects=(*FITTED, "drawing"),
+        subjects=("photo", "drawing"),
+        elsewhere="fitted",
         metavar="SIZE",
         parse=parse_bytes,
     )
@@ -263,10 +296,8 @@ class Settings:
         metavar="SIZE",
         parse=parse_bytes,
     )
-    detail: float = option(
-        0.5, "Of drawings: from 0, few big shapes, to 1, every speck; other kinds ignore it.", FRACTION
-    )
-    seed: int = option(0, "Random seed.", (0, 2**32 - 1))
+    detail: float = option(0.5, "Of drawings: from 0, few big shapes, to 1, every speck.", FRACTION, **DRAWN)
+    seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
     background: str = option(
         "auto",
         "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
@@ -289,6 +320,7 @@ class Settings:
     strokes: bool = option(
         False,
         "In drawings, lines of even width with round ends become strokes; drafts have none.",
+        **DRAWN,
     )
     minify: bool = option(
         False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
@@ -310,8 +342,8 @@ class Settings:
     )
     spline_points: int = research(12, "Control points of a new spline.", (3, 64))
     chain_cubics: int = research(2, "Cubics in each of the two chains of a fill.", (1, 8))
-    coarse: float = research(0.82, "Fraction of the iterations on a reduced image.", FRACTION)
-    coarse_pixels: int = research(100_000, "Most pixels of that image.", (1, 10**9))
+    coarse: float = research(0.82, "Fraction of the iterations on a reduced image.", FRACTION, **TUNING)
+    coarse_pixels: int = research(100_000, "Most pixels of that image.", (1, 10**9), **TUNING)
     fine_pixels: int = research(1_600_000, "Most pixels of the image in the last iterations.", (1, 10**9))
     opacity: float = research(0.98, "Opacity of a new shape, which hides what it replaces.", FRACTION)
     softness: float = research(0.6, "Least standard deviation of soft Gaussians [canvas px].", (0, 100))
@@ -333,7 +365,12 @@ class Settings:
     fold_end: float = research(3.0, "The same at the end: folds are a fault in the file.", (1e-6, 1e6))
     through_scales: bool = research(True, "Whether gradients flow through the Gaussians' scales and angles.")
     viewer: bool = research(True, "Whether the last steps see what a viewer shows, rounded.")
-    tidy: bool = research(True, "Whether drawings are fitted, and lose nodes worth less than their bytes.")
+    tidy: bool = research(
+        True,
+        "Whether drawings are fitted, and lose nodes worth less than their bytes.",
+        subjects=("drawing", "line"),
+        elsewhere="ignored",
+    )
     level_weight: float = research(0.3, "Weight of the error of each earlier level's picture.", WEIGHT)
     rates: dict[str, float] = research(
         default_rates, "Adam's rates at the start, by attribute.", WEIGHT, parse=parse_rates
@@ -349,8 +386,12 @@ class Settings:
         for is_broken, message in RULES:
             if is_broken(self):
                 raise UsageError(message.format(self))
-        if unsuited := self.unsuited(self.subject):
-            raise UsageError(f"subject {self.subject} and {unsuited[0]} cannot be combined")
+        for given in self.unsuited(self.subject):
+            if given.option.elsewhere != "ignored":
+                raise UsageError(
+                    f"subject {self.subject} and {given.name} cannot be combined; "
+                    f"{given.name} needs subject {' or '.join(given.option.subjects)}"
+                )
 
     @property
     def form(self) -> tuple[Basis, int]:
@@ -375,15 +416,46 @@ class Settings:
         given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
         return [name for name, value in (*given, ("time-budget", self.time_budget)) if value]
 
-    def unsuited(self, subject: Subject) -> list[str]:
-        """Return the options given that a subject has no use for, as users name them."""
-        names = []
+    @property
+    def painting(self) -> Painting:
+        """How fitted shapes are painted."""
+        return self.paint or "flat"
+
+    @property
+    def quality(self) -> Quality:
+        """The preset that these settings come from, by what only presets change."""
+        matching = (
+            quality
+            for quality in reversed(QUALITIES)
+            if all(getattr(self, name) == PRESETS[quality][name] for name in OF_PRESETS & {*PRESETS[quality]})
+        )
+        return next((quality for quality in matching if PRESETS[quality]), DEFAULT_QUALITY)
+
+    def unsuited(self, subject: Subject) -> list[Given]:
+        """Return the options given that have no effect on a subject."""
+        if subject == "auto":
+            return []
+        quality = self.quality
+        usual = replace(Settings(), **PRESETS[quality])
+        found = []
         for each in options_of(Settings):
             value = getattr(self, each.field)
-            if each.subjects and subject not in each.subjects and value != each.default:
-                of_value = [shorthand.name for shorthand in each.shorthands if shorthand.value == value]
-                names += of_value or [f"{each.name} {value}" if each.choices else each.name]
-        return names
+            if each.subjects and subject not in each.subjects and value != getattr(usual, each.field):
+                found.append(Given(self._called(each), each))
+        if self.is_limited:  # implies it
+            found = [given for given in found if given.option.field != "opaque"]
+        changed = [each for each in options_of(Settings) if each.field in OF_PRESETS & {*PRESETS[quality]}]
+        if changed and not any(subject in each.subjects for each in changed):
+            found.append(Given(f"quality {quality}", changed[0]))
+        return found
+
+    def _called(self, option: Option) -> str:
+        """Return an option given as its user names it."""
+        value = getattr(self, option.field)
+        if option.field == "levels" and value == levels_of(self.curves):
+            return "layered"
+        of_value = [shorthand.name for shorthand in option.shorthands if shorthand.value == value]
+        return of_value[0] if of_value else f"{option.name} {value}" if option.type is str else option.name
 
     def fingerprint(self) -> str:
         """Return a short hash of all that decides the result; a new option, not used, does not change it."""
@@ -404,7 +476,10 @@ RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
         lambda s: s.shape != CURVE and s.renderer != "exact",
         "shape {0.shape} and renderer {0.renderer} cannot be combined",
     ),
-    (lambda s: s.paint != "flat" and s.is_limited, "paint {0.paint} and {0.limited_by} cannot be combined"),
+    (
+        lambda s: s.painting != "flat" and s.is_limited,
+        "paint {0.paint} and {0.limited_by} cannot be combined",
+    ),
     (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
     (
         lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),

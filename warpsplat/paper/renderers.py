@@ -11,12 +11,12 @@ from warpsplat.fit.renderers import FitRenderer
 from warpsplat.fit.settings import Settings
 from warpsplat.paper import constants as paper
 from warpsplat.paper.as_paths import as_paths
-from warpsplat.paper.chains import as_chains
+from warpsplat.paper.chains import as_chains, chain_weights
 from warpsplat.paper.models import GaussianModel, SplatModel
 from warpsplat.paper.split import faded, split
 from warpsplat.portable import elementary
 from warpsplat.rendering.models import Model
-from warpsplat.scene import Basis, IndexArray, Scene
+from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 
 ITERATIONS = 0.5
 """Iterations over those of the exact renderer: a step takes several times as long."""
@@ -54,6 +54,10 @@ class Splat(FitRenderer):
         """See ``FitRenderer``."""
         return as_chains(scene)
 
+    def weights(self, scene: Scene) -> list[FloatArray]:
+        """See ``FitRenderer``."""
+        return chain_weights(scene)
+
 
 class Gaussian(Splat):
     """Soft Gaussians; the render's own squared error is what counts."""
@@ -75,7 +79,7 @@ class Gaussian(Splat):
         if settings.opaque or settings.is_limited:
             raise UsageError("opaque fills and the renderer gaussian cannot be combined")
         super().check(settings)
-        if settings.paint != "flat":
+        if settings.painting != "flat":
             raise UsageError("renderer gaussian needs the paint flat")
 
     def model(self, settings: Settings, step: int, slack: float) -> Model:

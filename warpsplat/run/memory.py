@@ -139,7 +139,7 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int, lanes: int = 0)
     slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * math.sqrt(tiles * curves) + SLOTS_A_SHAPE * curves
     slot = SLOT + lanes
     slot += SLOT_STROKE if settings.kind == Kind.STROKE or settings.mixed else 0
-    slot += SLOT_PAINT + lanes if settings.paint != "flat" else 0
+    slot += SLOT_PAINT + lanes if settings.painting != "flat" else 0
     levels = len(settings.levels) or 1
     return levels * 1.5 * slots * slot + TRAINED * pixels + SHAPE * curves
 

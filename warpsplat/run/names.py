@@ -127,14 +127,17 @@ def _in_folders(items: Iterable[ResultRequest]) -> dict[tuple[Path, Path], Path]
         local = len(group) > 1 and not any(is_remote(path) for _, path in group)
         common = os.path.commonpath(map(os.path.abspath, parents)) if local else ""
         for place, parent in zip(group, parents, strict=True):
-            below = os.path.relpath(parent, common) if local else ""
-            outputs[place] = output.parent / below / output.name
+            below = os.path.relpath(parent, common) if local else "."
+            outputs[place] = output if below == "." else output.parent / below / output.name
     return outputs
 
 
 def _folder(item: ResultRequest) -> Path:
     """Return the folder of a result that is given no name."""
-    return item.output / _below_root(item.image) if item.output else item.image.path.parent
+    if not item.output:
+        return item.image.path.parent
+    below = _below_root(item.image)
+    return item.output if below == "." else item.output / below  # a URL keeps the dot
 
 
 def _below_root(image: FoundImage) -> str:

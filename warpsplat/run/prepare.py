@@ -14,7 +14,7 @@ from warpsplat.files.sources import ImageSource, held, image_of, load_importance
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem
-from warpsplat.fit.settings import Settings, make_settings, solid_color
+from warpsplat.fit.settings import SUBJECTS, Settings, Subject, make_settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.portable.filters import boxed
 from warpsplat.run.memory import DeviceMemory, Reduction, factor_for, facts_of, mask_factor, reduction_for
@@ -25,6 +25,8 @@ from warpsplat.scene import FloatArray, Kind, Scene
 if TYPE_CHECKING:
     from warpsplat.rendering.backend import Backend
 
+OWN_LOSS = "a loss function"
+
 
 @dataclass(frozen=True)
 class PreparedImage:
@@ -33,6 +35,8 @@ class PreparedImage:
     problem: Problem
     why: str = ""
     """Why this subject was chosen; empty if it was given."""
+    notes: tuple[str, ...] = ()
+    """What may be unexpected, for people: such as options that have no effect on the subject."""
     reduction: Reduction | None = None
     """How the image was reduced to fit into memory; None if it was not."""
     name: str = "the image"
@@ -76,7 +80,7 @@ def prepare(
     mask_facts = None if importance is None else facts_of(importance)
     first = factor_for(facts, settings, name, mask_facts)
     target = load_target(source, name, settings.background, first)
-    chosen, why = choose_subject(target, settings)
+    chosen, why, notes = choose_subject(target, settings, loss)
     gpu = None
     if backend and choose_strategy(chosen).uses_device:
         gpu = DeviceMemory.of(backend().device)
@@ -86,8 +90,12 @@ def prepare(
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
     if loss and chosen.subject != "photo":
-        raise UsageError(f"subject {chosen.subject} and a loss function cannot be combined")
-    prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, reduction, name)
+        raise UsageError(f"subject {chosen.subject} and {OWN_LOSS} cannot be combined")
+    if importance is not None and chosen.subject != "photo":
+        notes += (no_effect(["importance"], chosen.subject),)
+    if target.shape[2] == 4 and not target[..., 3].any():
+        notes += ("every pixel is fully transparent: nothing is to be seen, and the file is empty",)
+    prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, notes, reduction, name)
     if importance is None:
         return prepared
     mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1
@@ -140,18 +148,40 @@ def starting_scene(
     return grid_scene(settings, target, curves, np.random.default_rng(seed))
 
 
-def choose_subject(target: FloatArray, settings: Settings) -> tuple[Settings, str]:
-    """Return ``settings`` with a subject, and the reason for it, which is empty if the subject was given.
+def choose_subject(
+    target: FloatArray, settings: Settings, loss: CustomLoss | None = None
+) -> tuple[Settings, str, tuple[str, ...]]:
+    """Return ``settings`` with a subject, the reason for it (empty if the subject was given), and notes.
 
-    Options that only fits know, as strokes, levels or a target PSNR, make any image a photograph.
+    ``Option.elsewhere`` decides about options that have no effect on the subject that is detected.
     """
-    if settings.subject != "auto":
-        return settings, ""
-    # A limit of bytes is for drawings too: they get fewer regions.
-    fitted = settings.unsuited("drawing")
-    if fitted:
-        return replace(settings, subject="photo"), f"{fitted[0]} is for fitted shapes"
-    guess = guess_subject(target)
-    if settings.max_bytes and guess.subject == "pixel":
-        return replace(settings, subject="photo"), "max-bytes is for fitted shapes and drawings"
-    return replace(settings, subject=guess.subject), guess.why
+    subject, why, notes = settings.subject, "", list[str]()
+    if subject == "auto":
+        guess = guess_subject(target)
+        subject, why = guess.subject, guess.why
+        asking = [name for name, option in settings.unsuited(subject) if option.elsewhere == "fitted"]
+        asking += [OWN_LOSS] if loss and subject != "photo" else []
+        if asking:
+            why = f"{_listed(asking)} {'ask' if asking[1:] else 'asks'} for fitted shapes"
+            notes.append(
+                f"looks like a {SUBJECTS[subject]}, but {why}, as of a photograph; "
+                f"without {'them' if asking[1:] else 'it'} the image would be traced"
+            )
+            subject = "photo"
+    without = settings.unsuited(subject)
+    if without:
+        notes.append(no_effect([given.name for given in without], subject))
+    usual = {
+        given.option.field: given.option.default for given in without if given.option.elsewhere == "refused"
+    }
+    return replace(settings, subject=subject, **usual), why, tuple(notes)
+
+
+def no_effect(names: list[str], subject: Subject) -> str:
+    """Return the note that options have no effect on a subject."""
+    return f"{_listed(names)} {'have' if names[1:] else 'has'} no effect on a {SUBJECTS[subject]}"
+
+
+def _listed(names: list[str]) -> str:
+    """Return names as English lists them."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

@@ -51,7 +51,8 @@ def render(
         image of 8 bits of it.
 
     Raises:
-        UsageError: sizes of other proportions than the scene's, or of no pixel.
+        UsageError: sizes of other proportions than the scene's, or of no pixel; a scene that this renderer
+            cannot draw.
         ImageError: an SVG that cannot be read, or not by this renderer.
         ResourceError: the picture takes more memory than there is.
     """
@@ -67,8 +68,17 @@ def render(
         return render(save_svg(scene), scale=zoom, renderer="viewer")
     viewport = Viewport(width or max(1, round(size[0] * zoom)), height or max(1, round(size[1] * zoom)), zoom)
     with backend_on(device, threads) as backend:
-        model = renderer_of(renderer).default_model
-        return _with_opacity(render_into(scene, viewport, model=model, backend=backend()))
+        fitted = renderer_of(renderer)
+        try:
+            scene = fitted.drawable(scene)
+        except ValueError as error:
+            raise UsageError(cannot_draw(error, renderer)) from None
+        return _with_opacity(render_into(scene, viewport, model=fitted.default_model, backend=backend()))
+
+
+def cannot_draw(error: ValueError, renderer: str) -> str:
+    """Return the message that a renderer cannot draw a scene, and why."""
+    return f"the scene {error}, which the renderer {renderer} cannot draw; the renderer exact can"
 
 
 def zoom_of(size: tuple[float, float], width: int | None, height: int | None, scale: float | None) -> float:

@@ -76,6 +76,8 @@ class Result:
     """The subject that the image was taken for."""
     why: str = ""
     """The reason for the subject; empty if it was given."""
+    notes: tuple[str, ...] = ()
+    """What may be unexpected, for people: such as options that have no effect on the subject."""
     history: tuple[Progress, ...] = field(default=(), compare=False)
     """The progress reports of the training, in order."""
     before: float | None = None
@@ -139,6 +141,7 @@ class Result:
             "subject": self.subject,
             "why": self.why,
             "device": self.device,
+            "notes": list(self.notes),
             "renderer": self.renderer,
             "render_psnr": finite(self.render_psnr),
             "render_ssim": None if self.render_ssim is None else round(self.render_ssim, 4),

@@ -100,8 +100,6 @@ def vectorize(
         raise UsageError(f"several numbers of shapes: vectorize_several(image, {list(curves)})")
     loss, given = custom_loss(options)
     settings = settings_given(vectorize, settings, curves=curves, **given)
-    if loss and settings.subject == "auto":
-        settings = replace(settings, subject="photo")
     given_files = (image, importance, output)
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
     write = None if output is None else functools.partial(write_named, path_of(output))
@@ -179,6 +177,7 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
+            notes=image.notes,
             history=tuple(history),
         )
     release_memory()

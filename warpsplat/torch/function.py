@@ -17,6 +17,7 @@ from warpsplat.rendering.models import Model
 from warpsplat.run.arguments import check_threads
 from warpsplat.run.render import zoom_of
 from warpsplat.scene import Canvas, Scene
+from warpsplat.torch.drawable import drawable
 from warpsplat.torch.engine import RenderSpec, check_memory
 from warpsplat.torch.passes import backward, forward
 from warpsplat.torch.tensors import SceneTensors
@@ -50,7 +51,8 @@ def render(
         for several scenes (scene, height, width, 4). On a canvas with a background the opacity is 1.
 
     Raises:
-        UsageError: an invalid size, renderer, number of threads or device, or no scene.
+        UsageError: an invalid size, renderer, number of threads or device; no scene, or one that the renderer
+            cannot draw.
         ResourceError: the images take more memory than there is.
         ValueError: a scene that the model cannot show, or a number that is not finite.
         TypeError: no scene.
@@ -72,7 +74,7 @@ def _render(
     threads: int | None,
 ) -> list[Tensor]:
     """Return the image of each scene; see ``render``."""
-    scenes = [_tensors_of(each) for each in given]
+    scenes = [drawable(_tensors_of(each), renderer) for each in given]
     if torch.compiler.is_compiling():
         width, height = (side if side is None else operator.index(side) for side in (width, height))  # static
         keys = [spec_key(one.layout, width, height, renderer, threads, one.device) for one in scenes]

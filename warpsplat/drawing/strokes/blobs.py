@@ -18,7 +18,7 @@ SMALLEST = 8  # points of a ring, at the least
 
 def pen_width(mask: Bools) -> float:
     """Return the usual width of the lines in a mask [px]."""
-    away = filters.distance(mask)
+    away = np.minimum(filters.distance(mask), sum(mask.shape))  # infinite where all is ink
     ridge = mask & (away >= cv2.dilate(away, np.ones((3, 3), np.uint8)))
     return max(1.0, 2 * float(np.quantile(away[ridge], USUAL)) - 1) if ridge.any() else 1.0
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes, unchecked
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
-from warpsplat.drawing.trace.ramps import fit_ramp
+from warpsplat.drawing.trace.ramps import Gradients, fit_ramp
 from warpsplat.portable import filters
 from warpsplat.portable.linear import product
+from warpsplat.scene.attributes import GRADIENTS
 
 LEAST_BAND = 30  # [px] of a band; smaller pieces stay with what surrounds them
 MOST_BANDS = 256  # of an image
@@ -51,7 +52,13 @@ class _Piece:
         return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
 
 
-def split_uneven(image: Floats, parts: Parts, noise: float, check: Callable[[], None] = unchecked) -> Parts:
+def split_uneven(
+    image: Floats,
+    parts: Parts,
+    noise: float,
+    check: Callable[[], None] = unchecked,
+    gradients: Gradients = GRADIENTS,
+) -> Parts:
     """Cut parts that neither a colour nor a gradient describes into bands, as many as are worth their bytes.
 
     Args:
@@ -59,6 +66,7 @@ def split_uneven(image: Floats, parts: Parts, noise: float, check: Callable[[], 
         parts: of the image.
         noise: of flat regions [levels].
         check: as for ``trace``.
+        gradients: as for ``trace``.
     """
     roots = _uneven(image, parts, UNEVEN + noise)
     if not roots:
@@ -72,7 +80,7 @@ def split_uneven(image: Floats, parts: Parts, noise: float, check: Callable[[], 
     while leaves and made < MOST_BANDS and -leaves[0][0] > FLAT_BYTES * DOUBLING * error / size:
         check()
         piece = heapq.heappop(leaves)[2]
-        halves = _halves(image, piece)
+        halves = _halves(image, piece, gradients)
         gain = piece.error - sum(half.error for half in halves)
         growth = sum(half.bytes() for half in halves) - piece.bytes()
         is_gain = gain / error > DOUBLING * growth / size
@@ -126,7 +134,7 @@ def _uneven(image: Floats, parts: Parts, least: float) -> list[_Piece]:
     return found
 
 
-def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
+def _halves(image: Floats, piece: _Piece, gradients: Gradients) -> list[_Piece]:
     """Return the connected parts of the lighter and the darker half of a piece."""
     own, mask = image[piece.box()], piece.mask
     if mask.sum() < 2 * LEAST_BAND or not np.ptp(own[mask], axis=0).any():
@@ -155,7 +163,7 @@ def _halves(image: Floats, piece: _Piece) -> list[_Piece]:
         )
         for number, (left, top, width, height, _) in enumerate(boxes[1:].tolist(), 1):
             part = numbers[top : top + height, left : left + width] == number
-            found.append(_piece(image, piece.left + left, piece.top + top, part))
+            found.append(_piece(image, piece.left + left, piece.top + top, part, gradients))
     return found
 
 
@@ -182,14 +190,14 @@ def _threshold(tones: Floats) -> float:
     return float(edges[1:-1][(below * above * apart**2).argmax()])
 
 
-def _piece(image: Floats, left: int, top: int, mask: Bools) -> _Piece:
+def _piece(image: Floats, left: int, top: int, mask: Bools, gradients: Gradients) -> _Piece:
     """Return a part of the image, in its bounding box, with the better of a flat colour and a gradient."""
     box = image[top : top + mask.shape[0], left : left + mask.shape[1]]
     pixels = box[mask].astype(np.float64)
     mean = pixels.mean(axis=0)
     flat = float(((pixels - mean) ** 2).sum())
     best = _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
-    ramp = fit_ramp(box, mask, left, top)
+    ramp = fit_ramp(box, mask, left, top, gradients)
     if ramp is not None:
         error = pixels.size * ramp.residual**2
         if error < flat * FLAT_BYTES / RAMP_BYTES:

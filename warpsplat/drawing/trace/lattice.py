@@ -151,6 +151,9 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
         soft: whether colours are interpolated between the centres of cells, where slopes change.
     """
     size = levels.shape[axis]
+    longest = min(PERIODS[1], size / CELLS[0])
+    if longest < PERIODS[0]:
+        return None
     first = max(0, size - SAMPLES) // 2
     # Noise and shading are everywhere, edges on few lines.
     steps = _steps(np.moveaxis(levels, axis, 0)[first : first + SAMPLES], soft=soft)
@@ -158,14 +161,13 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
     total = int(edges.sum())
     if not total or total**2 < FEWEST_EDGES * float(np.square(edges.astype(np.float64)).sum()):
         return None
-    longest = min(PERIODS[1], size / CELLS[0])
     turns = np.arange(int(np.ceil(TURN / longest)), int(TURN / PERIODS[0]) + 1, 1 + (size > SAMPLES // 2))
     lines = np.arange(len(edges)) + first + 1
     some = edges > 0
     places, weights = turns[:, None] * lines[some] & (TURN - 1), edges[some].astype(np.float64)
     waves = np.stack([wave.take(places) @ weights for wave in _turn()])
     coherence = np.sqrt(np.square(waves).sum(axis=0)) / (AMPLITUDE * total)
-    if not len(turns) or coherence.max() < COHERENCE:
+    if coherence.max() < COHERENCE:
         return None
     # The longest of the periods that are about as good: the others are fractions of it.
     best = int(np.argmax(coherence >= max(COHERENCE, NEARLY * coherence.max())))

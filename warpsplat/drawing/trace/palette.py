@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, bounding_boxes, channel_max
-from warpsplat.drawing.trace.ramps import Ramp, fit_ramp
+from warpsplat.drawing.trace.ramps import Gradients, Ramp, fit_ramp
+from warpsplat.scene.attributes import GRADIENTS
 
 CLEAR = 2.5  # [levels] opacity below which nothing is painted
 LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
@@ -48,7 +49,7 @@ class Parts:
     colorings: list[Coloring]
 
 
-def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
+def paint_parts(image: Floats, labels: Ints, noise: float, gradients: Gradients = GRADIENTS) -> Parts:
     """Find the colour or the ramp of each part; parts of nearly one colour share it."""
     count = int(labels.max()) + 1
     if count <= 0:
@@ -67,7 +68,8 @@ def paint_parts(image: Floats, labels: Ints, noise: float) -> Parts:
     boxes = bounding_boxes(labels, count)
     for part in np.flatnonzero((residual > UNEVEN + UNEVEN_NOISE * noise) & is_large).tolist():
         box = boxes[part].slices()
-        ramp = fit_ramp(image[box], labels[box] == part, boxes[part].left, boxes[part].top)
+        left, top = boxes[part].left, boxes[part].top
+        ramp = fit_ramp(image[box], labels[box] == part, left, top, gradients)
         if ramp is not None and ramp.residual < GAIN * float(residual[part]):
             paint[part] = len(colorings)
             colorings.append(Coloring(means[part], ramp))

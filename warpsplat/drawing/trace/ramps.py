@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,6 +14,7 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, product, solve, solve_banded
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Paint
+from warpsplat.scene.attributes import GRADIENTS
 
 SAMPLES = 4000  # pixels of a region that a ramp is fitted to, at the most
 LEAST_SLOPES = 8  # pixels where the slope is known, at the least
@@ -24,6 +26,9 @@ BIN = 1.0  # [px] how far apart these are, at least
 STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
 OFF = 1.0  # [levels] of the colours between two stops from a straight line, at the most
 MOST_STOPS = 8
+
+Gradients = Sequence[Paint]
+"""Kinds of gradients that may be taken."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,9 @@ class Ramp:
     """Root mean square of the error over all channels [levels]."""
 
 
-def fit_ramp(image: Floats, mask: Bools, left: int, top: int) -> Ramp | None:
+def fit_ramp(
+    image: Floats, mask: Bools, left: int, top: int, gradients: Gradients = GRADIENTS
+) -> Ramp | None:
     """Fit a linear and a radial gradient, and return the better one; None where there is no slope at all.
 
     Args:
@@ -49,20 +56,23 @@ def fit_ramp(image: Floats, mask: Bools, left: int, top: int) -> Ramp | None:
         mask: Its sure pixels, shape (height, width).
         left: Column of the box in the whole image.
         top: Its row.
+        gradients: Those that may be taken.
     """
+    if not gradients:
+        return None
     places, slopes = _slopes(image, mask)
     if len(places) < LEAST_SLOPES or not np.abs(slopes).max():
         return None
     rows, columns = _sampled(mask)
     points = np.stack([columns, rows], axis=1) + 0.5
     colors = image[rows, columns].astype(np.float64)
-    best = _linear(points, colors, slopes)
-    center = _center(places, slopes)
+    best = _linear(points, colors, slopes) if Paint.LINEAR in gradients else None
+    center = _center(places, slopes) if Paint.RADIAL in gradients else None
     if center is not None:
         radial = _radial(points, colors, center)
-        if radial.residual * (1 + RADIAL_HANDICAP) < best.residual:
+        if best is None or radial.residual * (1 + RADIAL_HANDICAP) < best.residual:
             best = radial
-    return replace(best, frame=best.frame + np.array([left, top, 0, 0, 0, 0], np.float64))
+    return best and replace(best, frame=best.frame + np.array([left, top, 0, 0, 0, 0], np.float64))
 
 
 def _sampled(mask: Bools) -> tuple[Ints, Ints]:

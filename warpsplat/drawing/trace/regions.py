@@ -13,9 +13,11 @@ from warpsplat.drawing.trace.bands import split_uneven
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, unchecked
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
 from warpsplat.drawing.trace.palette import Coloring, paint_parts
+from warpsplat.drawing.trace.ramps import Gradients
 from warpsplat.drawing.trace.seeds import find_seeds, noise_of
 from warpsplat.drawing.trace.thin_parts import add_thin_parts
 from warpsplat.portable import filters
+from warpsplat.scene.attributes import GRADIENTS
 
 NEGLIGIBLE_NOISE = 0.5  # [levels] noise below which an image counts as clean
 MOST_NOISE = 12.0  # [levels] that tolerances take into account
@@ -45,13 +47,19 @@ class Regions:
     """Pixels along one of the image."""
 
 
-def find_regions(image: Floats, price: float = 1.0, check: Callable[[], None] = unchecked) -> Regions:
+def find_regions(
+    image: Floats,
+    price: float = 1.0,
+    check: Callable[[], None] = unchecked,
+    gradients: Gradients = GRADIENTS,
+) -> Regions:
     """Cut an image up into regions.
 
     Args:
         image: Premultiplied sRGB with opacity, 0..255, shape (height, width, 4).
         price: As for ``trace``; below 1, specks that are hardly seen stay.
         check: As for ``trace``.
+        gradients: As for ``trace``.
     """
     image = np.asarray(image, np.float32)
     noise = noise_of(image)
@@ -63,7 +71,8 @@ def find_regions(image: Floats, price: float = 1.0, check: Callable[[], None] = 
     check()
     seeds = _without_mixed_seeds(image, find_seeds(image, min(noise, MOST_SEED_NOISE)), noise)
     check()
-    parts = split_uneven(image, paint_parts(image, seeds, noise), noise, check)
+    painted_parts = paint_parts(image, seeds, noise, gradients)
+    parts = split_uneven(image, painted_parts, noise, check, gradients)
     check()
     parts = add_thin_parts(image, parts, noise)
     check()

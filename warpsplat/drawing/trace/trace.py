@@ -28,11 +28,13 @@ from warpsplat.drawing.trace.order import (
 from warpsplat.drawing.trace.outlines import Boundary, find_boundary
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.planar import Loops, find_loops
+from warpsplat.drawing.trace.ramps import Gradients
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import Layers, find_outlines
 from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
+from warpsplat.scene.attributes import GRADIENTS
 from warpsplat.scene.scene import numbers_in, starts_of
 
 LEAST_AREA = 64  # [px] of an image for each of its regions: a letter that can be read takes as much
@@ -53,7 +55,12 @@ RUNS_TOGETHER = 2000
 
 
 def trace(
-    image: FloatArray, *, most: int | None = None, price: float = 1.0, check: Callable[[], None] = unchecked
+    image: FloatArray,
+    *,
+    most: int | None = None,
+    price: float = 1.0,
+    check: Callable[[], None] = unchecked,
+    gradients: Gradients = GRADIENTS,
 ) -> Traced:
     """Trace a drawing.
 
@@ -62,13 +69,14 @@ def trace(
         most: Paths at the most; the least visible regions are given up. None: no limit.
         price: Of a byte, over its usual one: the higher, the fewer regions are worth theirs.
         check: Called now and then; it may raise an exception to give up.
+        gradients: Kinds of gradients that regions may have, where they are worth their bytes.
     """
     levels = np.asarray(image, np.float32) * 255
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     height, width = levels.shape[:2]
-    regions = find_regions(levels, price, check)
+    regions = find_regions(levels, price, check, gradients)
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
     regions = worthwhile_regions(regions, price)
     traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)

@@ -381,10 +381,11 @@
 
   function finish(run, part) {
     part(".figures").replaceChildren(...figures(run));
-    const { subject, why, reduced } = run.figures;
+    const { subject, why, notes: noted, reduced } = run.figures;
     const notes = [];
     if (run.state === "stopped") notes.push("Stopped: the best so far.");
     if (why && subject !== "photo") notes.push(`Detected as ${subject}: ${why}.`);
+    for (const note of noted || []) notes.push(`${note.charAt(0).toUpperCase()}${note.slice(1)}.`);
     if (reduced) notes.push(`${reduced}.`);
     part(".why").textContent = notes.join(" ");
     part(".why").hidden = !notes.length;

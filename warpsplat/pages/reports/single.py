@@ -12,6 +12,7 @@ from PIL import Image
 from warpsplat.errors import ImageError, counted, printable
 from warpsplat.files.sources import ImageSource, held
 from warpsplat.fit.progress import Progress
+from warpsplat.fit.settings import SUBJECTS
 from warpsplat.pages.environment import page
 from warpsplat.pages.plot import Plot, plot
 from warpsplat.pages.reports.pictures import (
@@ -38,8 +39,6 @@ from warpsplat.svg.viewer import draw
 
 EXACT = "exact"
 """Text for a PSNR that is not finite."""
-
-SUBJECTS = {"photo": "photograph", "drawing": "drawing", "line": "line drawing", "pixel": "pixel art"}
 
 FIGURES = (
     ("PSNR", "psnr", ".2f", ".2f", "dB"),

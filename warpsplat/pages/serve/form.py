@@ -18,7 +18,7 @@ FIELDS = ("subject", "curves", "closed", "open", "mixed", "quality", "paint", "c
 def serve_page(limits: Limits) -> str:
     """Return the page as HTML. It is the same for all sessions: their states arrive as events."""
     options = {name: BY_NAME[name] for name in FIELDS}
-    defaults = {name: option.default if option.choices else "" for name, option in options.items()}
+    defaults = {name: option.default or "" if option.choices else "" for name, option in options.items()}
     return page(
         "serve.html.j2",
         assets=("viewer.css", "serve.css", "viewer.js", "serve.js"),

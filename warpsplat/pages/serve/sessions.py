@@ -15,7 +15,7 @@ from warpsplat.run.result import Result
 
 State = Literal["waiting", "running", "done", "stopped", "failed"]
 
-FIGURES = ("psnr", "exact", "ssim", "bytes", "shapes", "seconds", "subject", "why", "reduced")
+FIGURES = ("psnr", "exact", "ssim", "bytes", "shapes", "seconds", "subject", "why", "notes", "reduced")
 """Keys of ``Result.as_dict`` that the page shows."""
 
 

@@ -152,7 +152,7 @@ def command(
 
     def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
         with interrupt.watching(), progress_bar(path, quiet=quiet, verbose=verbose) as on_progress:
-            chosen, _ = choose_subject(target, ours)
+            chosen, *_ = choose_subject(target, ours)
             image = PreparedImage(Problem(target, chosen))
             return make_result(image, Run(backend, on_progress, interrupt), write)
 

@@ -1,0 +1,130 @@
+"""What becomes of options that have no effect on what an image shows, which a note says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpsplat
+from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from warpsplat.errors import UsageError
+from warpsplat.fit.settings import make_settings
+from warpsplat.run.prepare import choose_subject
+from warpsplat.scene import FloatArray
+
+CELLS = np.kron(np.random.default_rng(0).integers(0, 2, (12, 12, 1)), np.ones((8, 8, 3))).astype(np.float32)
+
+IMAGES = {"drawing": draw(ground("#fff") + LOGO)[..., :3], "photo": photograph(96), "pixel": CELLS}
+
+
+def eight_bits(image: FloatArray) -> np.ndarray:
+    return np.round(255 * image).astype(np.uint8)
+
+
+@pytest.mark.parametrize("shown", IMAGES)
+def test_what_is_not_asked_for_needs_no_note(shown: str) -> None:
+    settings, why, notes = choose_subject(
+        IMAGES[shown], make_settings("draft" if shown == "drawing" else "balanced")
+    )
+    assert (settings.subject, notes) == (shown, ()) and why
+
+
+@pytest.mark.parametrize("shown", ["drawing", "pixel"])
+@pytest.mark.parametrize(
+    ("given", "called"),
+    [
+        ({"open": True}, "open"),
+        ({"shape": "ellipse"}, "shape ellipse"),
+        ({"mixed": True}, "mixed"),
+        ({"renderer": "splat"}, "renderer splat"),
+        ({"layered": True}, "layered"),
+        ({"levels": "8,16"}, "levels"),
+        ({"target_psnr": 30.0}, "target-psnr"),
+    ],
+)
+def test_options_that_ask_for_a_fit(shown: str, given: dict[str, Any], called: str) -> None:
+    settings, _, notes = choose_subject(IMAGES[shown], make_settings(**given))
+    assert settings.subject == "photo"
+    (note,) = notes
+    assert f"but {called} asks for fitted shapes" in note and "without it the image would be traced" in note
+    _, why, notes = choose_subject(IMAGES["photo"], make_settings(**given))
+    assert why and not notes
+
+
+@pytest.mark.parametrize(
+    ("shown", "given", "called"),
+    [
+        ("drawing", {"loss": "edges"}, "loss edges has"),
+        ("drawing", {"quality": "high"}, "quality high has"),
+        ("drawing", {"iterations": 300, "quality": "draft"}, "iterations has"),
+        ("drawing", {"seed": 3, "opaque": True}, "opaque and seed have"),
+        ("photo", {"detail": 0.8}, "detail has"),
+        ("photo", {"symbols": True, "strokes": True, "detail": 0.2}, "detail, symbols and strokes have"),
+        (
+            "pixel",
+            {"quality": "draft", "curves": 50, "paint": "auto"},
+            "curves, paint auto and quality draft have",
+        ),
+    ],
+)
+def test_options_without_effect_leave_the_subject(shown: str, given: dict[str, Any], called: str) -> None:
+    settings, _, notes = choose_subject(IMAGES[shown], make_settings(**given))
+    assert settings.subject == shown
+    (note,) = notes
+    assert note.startswith(f"{called} no effect on a ")
+
+
+@pytest.mark.parametrize(
+    ("shown", "given"),
+    [
+        ("drawing", {"max_bytes": 900}),
+        ("drawing", {"paint": "flat", "detail": 0.8, "curves": 30}),
+        ("drawing", {"colors": 4}),
+        ("photo", {"paint": "auto", "loss": "ssim", "quality": "high", "seed": 2, "opaque": True}),
+    ],
+)
+def test_options_with_an_effect_need_no_note(shown: str, given: dict[str, Any]) -> None:
+    settings, _, notes = choose_subject(IMAGES[shown], make_settings(**given))
+    assert (settings.subject, notes) == (shown, ())
+
+
+def test_a_subject_that_is_given_is_not_changed() -> None:
+    with pytest.raises(UsageError, match=r"loss edges cannot be combined; loss edges needs subject photo$"):
+        make_settings(subject="drawing", loss="edges")
+    with pytest.raises(UsageError, match=r"symbols needs subject drawing$"):
+        make_settings(subject="photo", symbols=True)
+    settings = make_settings(subject="drawing", quality="high")
+    assert choose_subject(IMAGES["drawing"], settings)[1:] == (
+        "",
+        ("quality high has no effect on a drawing",),
+    )
+
+
+def test_results_have_the_notes() -> None:
+    image = eight_bits(IMAGES["drawing"])
+    plain = warpsplat.vectorize(image, quality="draft")
+    made = warpsplat.vectorize(image, quality="draft", loss="edges", importance=image)
+    assert made.svg == plain.svg and not plain.notes
+    assert made.notes == (
+        "loss edges has no effect on a drawing",
+        "importance has no effect on a drawing",
+    )
+    assert made.as_dict()["notes"] == [*made.notes]
+
+
+def test_a_loss_of_your_own_asks_for_a_fit() -> None:
+    made = warpsplat.vectorize(
+        eight_bits(IMAGES["drawing"]),
+        4,
+        iterations=2,
+        loss=lambda image: (float((image**2).sum()), 2 * image),
+        device="cpu",
+    )
+    assert made.subject == "photo" and "a loss function asks for fitted shapes" in made.notes[0]
+
+
+def test_an_image_of_which_nothing_is_seen_is_noted() -> None:
+    (note,) = warpsplat.vectorize(np.zeros((24, 24, 4), np.uint8)).notes
+    assert note.startswith("every pixel is fully transparent")
