@@ -206,7 +206,7 @@ def test_few_shapes_are_fitted_to_fewer_pixels() -> None:
         ({"shape": "ellipse", "open": True}, "shape ellipse and open cannot be combined"),
         ({"shape": "line", "closed": True}, "shape line and closed cannot be combined"),
         ({"shape": "circle", "mixed": True}, "mixed and shape circle"),
-        ({"shape": "circle", "subject": "drawing"}, "subject drawing and shape cannot be combined"),
+        ({"shape": "circle", "subject": "drawing"}, "subject drawing and shape circle cannot be combined"),
         ({"basis": "circle"}, "basis must be one of cubic, spline"),
     ],
 )

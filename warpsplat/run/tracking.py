@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warpsplat.errors import DeviceError
+from warpsplat.errors import DeviceError, counted
 from warpsplat.fit.problem import Fit, Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.fit.settings import Settings
@@ -66,7 +66,8 @@ def failed(run: Run, name: str, result: Result) -> DeviceError:
     """Return the error of a run whose device failed, and that has made ``result`` of what was left."""
     saved = run.checkpoint and not run.checkpoint.is_empty
     resumed = "; --resume continues from the checkpoint" if saved else ""
-    left = f"has the shapes after {result.iterations} steps" if result.iterations else "is the trace alone"
+    after = f"has the shapes after {counted(result.iterations, 'step')}"
+    left = after if result.iterations else "is the trace alone"
     text = f"{name}: {run.failures[0]}; its file {left}{resumed}"
     error = DeviceError(text)
     error.result, error.is_lost = result, run.failures[0].is_lost

@@ -118,7 +118,7 @@ def test_refusals_are_shown_where_they_belong(visit: Page, complaints: Complaint
     page.get_by_text("Strokes", exact=True).click()
     page.keyboard.press("Enter")
     page.wait_for_selector("#refused:not([hidden])")
-    assert error.inner_text() == "subject drawing and open cannot be combined"
+    assert error.inner_text() == "subject drawing and open cannot be combined; open needs subject photo"
     assert not page.locator(".run").count()
     wait_until(page, lambda: len(complaints) >= 2)
     assert [int(text.rpartition("status of ")[2][:3]) for text in complaints] == [415, 400]
