@@ -49,6 +49,8 @@ def test_options_that_ask_for_a_fit(shown: str, given: dict[str, Any], called: s
     assert settings.subject == "photo"
     (note,) = notes
     assert f"but {called} asks for fitted shapes" in note and "without it the image would be traced" in note
+    _, _, notes = choose_subject(IMAGES[shown], make_settings("draft", iterations=9, **given))
+    assert len(notes) == 1, "what a quality stands for was not asked for by name"
     _, why, notes = choose_subject(IMAGES["photo"], make_settings(**given))
     assert why and not notes
 

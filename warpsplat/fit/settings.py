@@ -435,12 +435,13 @@ class Settings:
         """Return the options given that have no effect on a subject."""
         if subject == "auto":
             return []
-        quality = self.quality
-        usual = replace(Settings(), **PRESETS[quality])
+        quality, usual = self.quality, Settings()
         found = []
         for each in options_of(Settings):
             value = getattr(self, each.field)
-            if each.subjects and subject not in each.subjects and value != getattr(usual, each.field):
+            by_quality = value in [preset[each.field] for preset in PRESETS.values() if each.field in preset]
+            is_given = value != getattr(usual, each.field) and not by_quality
+            if each.subjects and subject not in each.subjects and is_given:
                 found.append(Given(self._called(each), each))
         if self.is_limited:  # implies it
             found = [given for given in found if given.option.field != "opaque"]
