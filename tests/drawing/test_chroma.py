@@ -11,7 +11,7 @@ from PIL import Image
 from tests.drawing.trace.drawings import draw_exactly, ground
 from tests.runs import vectorize
 from warpsplat.drawing import chroma
-from warpsplat.drawing.chroma import has_blurred_colors
+from warpsplat.drawing.denoise import has_blurred_colors
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,6 @@ import pytest
 import warpsplat
 from warpsplat.drawing.draft import glyphs_of
 from warpsplat.drawing.glyphs import find_glyphs
-from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Scene
 
@@ -123,13 +123,25 @@ def test_a_page_of_letters_is_drawn_with_equal_outlines(quality: str) -> None:
     assert len(moved_to_origin(warpsplat.load_svg(made.svg))) <= 12
 
 
-@pytest.mark.parametrize("limit", [{"curves": 12}, {"colors": 4}, {"max_bytes": 4000}, {"detail": 0.2}])
-def test_what_is_limited_is_drawn_as_a_whole(limit: dict[str, float]) -> None:
-    image = page()
-    assert glyphs_of(Problem(image, make_settings()))[0]
-    sheet, rest = glyphs_of(Problem(image, make_settings(**limit)))
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+@pytest.mark.parametrize("limit", [{"curves": 500}, {"colors": 64}, {"max_bytes": "1MB"}])
+def test_a_limit_that_does_not_bind_changes_nothing(quality: str, limit: dict[str, Any]) -> None:
+    given = {"subject": "drawing", "quality": quality, "threads": 1}
+    assert warpsplat.vectorize(page(), **given, **limit).svg == warpsplat.vectorize(page(), **given).svg
+
+
+@pytest.mark.parametrize("limit", [{"curves": 3}, {"colors": 2}, {"max_bytes": 900}])
+def test_a_limit_that_binds_is_kept(limit: dict[str, Any]) -> None:
+    made = warpsplat.vectorize(page(), subject="drawing", quality="draft", **limit)
+    assert len(made.scene) <= limit.get("curves", np.inf)
+    assert len(np.unique(made.scene.colors, axis=0)) <= limit.get("colors", np.inf)
+    assert len(made.svg.encode()) <= limit.get("max_bytes", np.inf)
+
+
+def test_letters_are_no_details_that_are_given_up() -> None:
+    sheet, rest = glyphs_of(page(), make_settings(detail=0.2))
     assert sheet is None
-    assert np.array_equal(rest, image)
+    assert np.array_equal(rest, page())
 
 
 def test_nothing_drawn_on_a_sheet_adds_nothing() -> None:

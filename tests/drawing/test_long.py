@@ -15,8 +15,9 @@ from tests.drawing.drawings import RED, WHITE, disc, drawing
 from tests.drawing.trace.drawings import LOGO, draw
 from warpsplat.drawing import draft
 from warpsplat.drawing.draw import announce_fit, announce_trace
+from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings
 from warpsplat.portable.filters import boxed
 from warpsplat.scene import Canvas
@@ -28,15 +29,15 @@ def test_it_says_how_many_nodes_take_how_long(
 ) -> None:
     made = drawing(Canvas(64, 64, WHITE), (RED, [disc(32, 32, 9)] * discs))
     with caplog.at_level(logging.WARNING):
-        announce_fit(len(made.joints) // 3, Problem(np.ones((64, 64, 3), np.float32), Settings()))
+        announce_fit(len(made.joints) // 3, Picture.of(np.ones((64, 64, 3), np.float32)), Settings())
     assert ["12,000 nodes takes about 7 s" in message for message in caplog.messages] == [True] * is_long
 
 
 def test_it_says_how_many_pixels_take_how_long_to_trace(caplog: pytest.LogCaptureFixture) -> None:
     image = np.random.default_rng(0).random((1500, 1500, 3), np.float32)
     with caplog.at_level(logging.WARNING):
-        announce_trace(Problem(image, Settings()))
-        announce_trace(Problem(image, Settings(time_budget=9.0)))
+        announce_trace(Picture.of(image), Settings())
+        announce_trace(Picture.of(image), Settings(time_budget=9.0))
     assert ["tracing its 2.2 megapixels takes about 9 s" in message for message in caplog.messages] == [True]
 
 
@@ -50,7 +51,7 @@ def test_a_trace_ends_in_time_by_fewer_pixels(
     monkeypatch.setattr(draft, "QUICK_PIXELS", 1000)
     image = draw(LOGO)
     run = Run(lambda: pytest.fail("a trace needs no device"), deadline=time_left)
-    made = draft.trace_in_time(image, None, Settings(), run).scene
+    made = draft.trace_in_time(image, None, None, Settings(), run).scene
     small = trace(boxed(image, factor) if factor > 1 else image).scene
     assert (made.points == factor * small.points).all()
     assert (made.canvas.width, made.canvas.height) == image.shape[1::-1]
@@ -60,7 +61,7 @@ def test_a_trace_that_is_stopped_is_one_of_few_pixels(monkeypatch: pytest.Monkey
     monkeypatch.setattr(draft, "QUICK_PIXELS", 1000)
     image, stops = draw(LOGO), itertools.count()
     run = Run(lambda: pytest.fail("a trace needs no device"), stop=lambda: next(stops) >= 4)
-    made = draft.trace_in_time(image, None, Settings(), run).scene
+    made = draft.trace_in_time(image, None, None, Settings(), run).scene
     assert (made.points == 4 * trace(boxed(image, 4)).scene.points).all()
 
 

@@ -12,7 +12,7 @@ import warpsplat
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
 from tests.runs import scored, vectorize
-from warpsplat.drawing.draft import LEAST_ORIGINAL_SIDE, enlargement
+from warpsplat.drawing.picture import LEAST_ORIGINAL_SIDE, Picture
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
@@ -54,7 +54,7 @@ def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> N
 )
 def test_enlargement_leaves_a_picture_to_trace(side: int, times: int, found: int) -> None:
     noise = np.random.default_rng(0).random((side, side + 1, 3)).astype(np.float32)
-    assert enlargement(repeated(noise, times)) == found
+    assert Picture.of(repeated(noise, times)).enlargement == found
 
 
 @pytest.mark.parametrize("given", [{"colors": 2}, {"palette": "#06c,#fc0"}])

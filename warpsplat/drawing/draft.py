@@ -12,9 +12,10 @@ import numpy as np
 from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.glyphs import find_glyphs
+from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.trace.grids import unchecked
-from warpsplat.drawing.trace.pixels import cell_size, trace_pixels
+from warpsplat.drawing.trace.pixels import trace_pixels
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.errors import Stopped
 from warpsplat.fit.export import finished
@@ -28,9 +29,6 @@ from warpsplat.portable.filters import boxed
 from warpsplat.scene import FloatArray, Paint, Scene
 from warpsplat.scene.attributes import GRADIENTS
 from warpsplat.scene.geometry import enlarged
-
-LEAST_ORIGINAL_SIDE = 96
-"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
 
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft: a trace is no nearer to the image (docs/experiments.md)."""
@@ -59,15 +57,22 @@ USUAL_DETAIL = 0.5
 
 def draft_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions."""
-    settings = problem.settings
+    settings, picture = problem.settings, Picture.of(problem.target)
 
-    def sketch(most: int | None) -> Sketch:
-        made = _best_if_thin(problem, run, most)
+    def sketch(most: int | None, glyphs: bool = False) -> Sketch:
+        made = _best_if_thin(problem, picture, run, most, glyphs)
         return Sketch(made, len(finished(made.scene, settings, made.per_pixel).encode()), None)
 
-    first = sketch(None if settings.simplify else settings.curves)
-    if not settings.max_bytes or first.size <= settings.max_bytes:
+    def fits(made: Sketch) -> bool:
+        return not settings.max_bytes or made.size <= settings.max_bytes
+
+    most, first = most_shapes(settings), sketch(None, glyphs=True)
+    if len(first.fit.scene) <= most and fits(first):
         return first.fit
+    first = sketch(None if settings.simplify else settings.curves)
+    if fits(first):
+        return first.fit
+    assert settings.max_bytes
     best = best_within(first, settings.max_bytes, sketch, lambda drawing, price: first, run.over)
     return replace(best, interrupted=run.stopped())
 
@@ -77,46 +82,57 @@ def byte_price(settings: Settings) -> float:
     return float(elementary.exp((1 - 2 * settings.detail) * elementary.log(DEAREST)))
 
 
-def _best_if_thin(problem: Problem, run: Run, most: int | None) -> Fit:
-    """Trace an image; one of few rows or columns also continued beyond its borders, or as cells."""
-    size, settings = enlargement(problem.target), problem.settings
+def most_shapes(settings: Settings) -> float:
+    """Return how many paths a drawing may have."""
+    return math.inf if settings.simplify else settings.curves
+
+
+def _best_if_thin(problem: Problem, picture: Picture, run: Run, most: int | None, glyphs: bool) -> Fit:
+    """Trace an image; one of few rows or columns also continued beyond its borders, or as cells.
+
+    ``glyphs``: whether letters are drawn once.
+    """
+    settings = problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        sheet, image = glyphs_of(problem)
-        scene = trace_in_time(continued(image, across, down), most, settings, run).scene
+        sheet, image = glyphs_of(picture.pixels, settings) if glyphs else (None, picture.pixels)
+        scene = trace_in_time(continued(image, across, down), picture.noise, most, settings, run).scene
         scene = sheet.placed(sheet.trace().scene, scene) if sheet else scene
         if settings.is_limited:
             scene = limited(scene.take(solid_shapes(scene)), settings)
-        scene = enlarged(cut(scene, across, down), size, *problem.size)
-        per_pixel = min(DRAFT_GRID, finest(settings)) / size
+        scene = picture.placed(cut(scene, across, down))
+        per_pixel = min(DRAFT_GRID, finest(settings)) / picture.enlargement
         if settings.max_bytes or any(margin):
             return as_fit(scene, per_pixel, problem, run)
         return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
 
-    margin = margins(problem.target, THIN_SIDE)
+    margin = margins(picture.pixels, THIN_SIDE)
     if not any(margin):
         return traced()
     others = [lambda: traced(*margin), lambda: draw_pixels(problem, run)]
     return best_of_thin(traced(), others[: 1 if most is not None else 2])
 
 
-def glyphs_of(problem: Problem) -> tuple[Sheet | None, FloatArray]:
-    """Return the sheet of an image's glyphs, and the image without them; None where something is limited."""
-    image, settings = original(problem.target), problem.settings
-    limits = settings.curves and not settings.simplify, settings.max_bytes, settings.is_limited
-    if any(limits) or settings.detail < USUAL_DETAIL or any(margins(problem.target, THIN_SIDE)):
+def glyphs_of(image: FloatArray, settings: Settings) -> tuple[Sheet | None, FloatArray]:
+    """Return the sheet of an image's glyphs, and the image without them; None where details are given up."""
+    if settings.detail < USUAL_DETAIL or any(margins(image, THIN_SIDE)):
         return None, image
     return find_glyphs(image)
 
 
-def trace_in_time(image: FloatArray, most: int | None, settings: Settings, run: Run) -> Traced:
-    """Trace an image, at a lower resolution if the run's time is too short or the run is stopped."""
+def trace_in_time(
+    image: FloatArray, noise: float | None, most: int | None, settings: Settings, run: Run
+) -> Traced:
+    """Trace an image, at a lower resolution if the run's time is too short or the run is stopped.
+
+    ``noise`` and ``most``: as for ``trace``.
+    """
     height, width = image.shape[:2]
 
     def traced(factor: int, check: Callable[[], None]) -> Traced:
         small = boxed(image, factor) if factor > 1 else image
         price, gradients = byte_price(settings), DRAWN_GRADIENTS[settings.paint or "auto"]
-        found = trace(small, most=most, price=price, check=check, gradients=gradients)
+        found = trace(small, most=most, price=price, check=check, gradients=gradients, noise=noise)
         return replace(found, scene=enlarged(found.scene, factor, width, height))
 
     least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))
@@ -139,22 +155,6 @@ def as_fit(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
     """Return a traced scene as a fit: its PSNR is that of its file."""
     figure = psnr_of_file(finished(scene, problem.settings, per_pixel), problem.target)
     return Fit(scene, per_pixel, figure, figure, 0, run.stopped())
-
-
-def enlargement(image: FloatArray) -> int:
-    """Return how many times an image was enlarged by repeating its pixels.
-
-    Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
-    """
-    size, side = cell_size(image), min(image.shape[:2])
-    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_ORIGINAL_SIDE)
-    return max(fits, default=1)
-
-
-def original(target: FloatArray) -> FloatArray:
-    """Return an image as it was before it was enlarged."""
-    size = enlargement(target)
-    return np.ascontiguousarray(target[::size, ::size])
 
 
 def limited(scene: Scene, settings: Settings) -> Scene:

@@ -15,13 +15,13 @@ from warpsplat.drawing.draft import (
     as_fit,
     byte_price,
     draw_pixels,
-    enlargement,
     glyphs_of,
     limited,
-    original,
+    most_shapes,
     trace_in_time,
 )
 from warpsplat.drawing.glyph_sheet import Sheet
+from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.drawing.tidy import LEAST_ERROR, Finished
 from warpsplat.errors import counted
@@ -31,7 +31,6 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.scene.geometry import enlarged
 
 SECONDS_PER_TRACED = 4e-6
 """Rough time of tracing a pixel on one core [s]."""
@@ -52,29 +51,33 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes."""
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
-    announce_trace(problem)
-    sheet, rest = glyphs_of(problem)
+    picture = Picture.of(problem.target)
+    announce_trace(picture, settings)
+    sheet, rest = glyphs_of(picture.pixels, settings)
     if sheet:
-        return _drawn_with_sheet(problem, run, sheet, rest)
-    traced = trace_regions(problem, run, most)
+        made = _drawn_with_sheet(picture, settings, run, sheet, rest)
+        if made and (not limit or _size(made, settings) <= limit):
+            return made
+    traced = trace_regions(picture.pixels, picture.noise, settings, run, most)
     if not run.over():
-        announce_fit(len(traced.joints) // 3, problem)
+        announce_fit(len(traced.joints) // 3, picture, settings)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
-    finish = partial(_finish, settings, original(problem.target))
+    finish = partial(_finish, settings, picture.pixels, negligible=LEAST_ERROR * picture.drawn_share)
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
-        sketch = _sketch(problem, run, done)
-        best = _best_if_thin(problem, next(parts), sketch.fit, most)
+        sketch = _sketch(problem, picture, run, done)
+        best = _best_if_thin(problem, picture, next(parts), sketch.fit, most)
         return sketch if best is sketch.fit else Sketch(best, _size(best, settings), None)
 
     def fewer(count: int) -> Sketch:
-        return sketch_of(finish(trace_regions(problem, run, count), next(parts)), count)
+        return sketch_of(
+            finish(trace_regions(picture.pixels, picture.noise, settings, run, count), next(parts)), count
+        )
 
     def simpler(drawing: Drawing, price: float) -> Sketch:
-        return _sketch(
-            problem, run, finish(drawing, next(parts), tidy=True, price=price * byte_price(settings))
-        )
+        done = finish(drawing, next(parts), tidy=True, price=price * byte_price(settings))
+        return _sketch(problem, picture, run, done)
 
     first = sketch_of(finish(traced, next(parts)), most)
     if not limit or first.size <= limit:
@@ -93,78 +96,82 @@ def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, 
     return finish_by_lightness(target, drawing, run, **(usual | options))
 
 
-def _drawn_with_sheet(problem: Problem, run: Run, sheet: Sheet, rest: FloatArray) -> Fit:
-    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes."""
-    settings, found = problem.settings, sheet.trace()
+def _drawn_with_sheet(
+    picture: Picture, settings: Settings, run: Run, sheet: Sheet, rest: FloatArray
+) -> Fit | None:
+    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes.
+
+    Return None if these are more paths than are allowed.
+    """
+    found, others = sheet.trace(), trace_regions(rest, picture.noise, settings, run, None)
+    if len(sheet.placed(found.scene, others.scene)) > most_shapes(settings):
+        return None
     copies = len(sheet.copies) / len(sheet.corners)
-    parts = [
-        (Drawing(found.scene, found.joints), sheet.image, copies),
-        (trace_regions(replace(problem, target=rest), run, None), rest, 1.0),
-    ]
+    parts = [(Drawing(found.scene, found.joints), sheet.image, copies), (others, rest, 1.0)]
     nodes = [len(drawing.joints) / 3 * times for drawing, _, times in parts]
     if not run.over():
-        announce_fit(sum(len(drawing.joints) for drawing, *_ in parts) // 3, problem)
+        announce_fit(sum(len(drawing.joints) for drawing, *_ in parts) // 3, picture, settings)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * sum(nodes))
     scenes: list[Scene] = []
     grid, runs = None, run.open_parts()
     glyphs_first = nodes[0] >= nodes[1]
     for drawing, image, times in parts if glyphs_first else parts[::-1]:
         # What does not count in all of the image, in pixels of this part.
-        negligible = LEAST_ERROR * max(rest[..., 0].size / (times * image[..., 0].size), 1.0)
+        share = picture.drawn_share * rest[..., 0].size / (times * image[..., 0].size)
+        negligible = LEAST_ERROR * max(share, picture.drawn_share)
         done = _finish(settings, image, drawing, next(runs), grid=grid, negligible=negligible)
         grid = done.per_pixel
         scenes.append(done.drawing.scene)
-    glyphs, others = scenes if glyphs_first else scenes[::-1]
-    scene, per_pixel = _whole(sheet.placed(glyphs, others), done.per_pixel, problem, run)
+    scene = sheet.placed(*(scenes if glyphs_first else scenes[::-1]))
+    if settings.is_limited:
+        scene = limited(scene.take(solid_shapes(scene)), settings)
+    scene, per_pixel = _whole(scene, done.per_pixel, picture, settings, run)
     return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
 
 
-def announce_trace(problem: Problem) -> None:
-    """Say so if the trace of an image will take long."""
-    pixels = original(problem.target)[..., 0].size
-    _announce(problem, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_TRACED * pixels)
+def announce_trace(picture: Picture, settings: Settings) -> None:
+    """Say so if the trace of a picture will take long."""
+    pixels = picture.pixels[..., 0].size
+    _announce(settings, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_TRACED * pixels)
 
 
-def announce_fit(nodes: int, problem: Problem) -> None:
+def announce_fit(nodes: int, picture: Picture, settings: Settings) -> None:
     """Say so if the fit of a drawing with so many traced nodes will take long."""
-    width, height = problem.size
-    seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * width * height
-    _announce(problem, f"fitting its {counted(nodes, 'node')}", seconds)
+    seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * picture.pixels[..., 0].size
+    _announce(settings, f"fitting its {counted(nodes, 'node')}", seconds)
 
 
-def _announce(problem: Problem, work: str, seconds: float) -> None:
+def _announce(settings: Settings, work: str, seconds: float) -> None:
     """Say so if work will take long and has no time limit, and what makes it shorter."""
-    if seconds > LONG and problem.settings.time_budget is None:
+    if seconds > LONG and settings.time_budget is None:
         how = "--time-budget or --quality draft make it shorter"
         log.warning("%s takes about %.0f s; %s", work, seconds, how)
 
 
-def _best_if_thin(problem: Problem, run: Run, made: Fit, most: int | None) -> Fit:
+def _best_if_thin(problem: Problem, picture: Picture, run: Run, made: Fit, most: int | None) -> Fit:
     """Return the drawing or, for an image of few rows or columns, a better one if there is one."""
-    across, down = margins(problem.target, THIN_SIDE)
+    across, down = margins(picture.pixels, THIN_SIDE)
     if not (across or down):
         return made
-    others = [lambda: _drawn_beyond(problem, run, most)]
+    others = [lambda: _drawn_beyond(problem, picture, run, most)]
     return best_of_thin(made, others if most is not None else [*others, lambda: draw_pixels(problem, run)])
 
 
-def _drawn_beyond(problem: Problem, run: Run, most: int | None) -> Fit:
-    """Draw the image continued beyond its borders, and cut the drawing."""
-    across, down = margins(problem.target, THIN_SIDE)
-    wide = replace(problem, target=continued(problem.target, across, down))
-    drawing = trace_regions(wide, run, most)
-    done = _finish(problem.settings, original(wide.target), drawing, run, symbols=False)
-    made = _sketch(wide, run, done).fit
-    return as_fit(cut(made.scene, across, down), made.per_pixel, problem, run)
+def _drawn_beyond(problem: Problem, picture: Picture, run: Run, most: int | None) -> Fit:
+    """Draw the picture continued beyond its borders, and cut the drawing."""
+    across, down = margins(picture.pixels, THIN_SIDE)
+    wide, settings = continued(picture.pixels, across, down), problem.settings
+    drawing = trace_regions(wide, picture.noise, settings, run, most)
+    done = _finish(settings, wide, drawing, run, symbols=False)
+    scene = cut(done.drawing.scene, across, down)
+    return as_fit(*_whole(scene, done.per_pixel, picture, settings, run), problem, run)
 
 
-def trace_regions(problem: Problem, run: Run, most: int | None) -> Drawing:
-    """Trace an image as it was before it was enlarged, in the colours that are allowed.
-
-    ``most``: regions.
-    """
-    settings = problem.settings
-    traced = trace_in_time(original(problem.target), most, settings, run)
+def trace_regions(
+    image: FloatArray, noise: float | None, settings: Settings, run: Run, most: int | None
+) -> Drawing:
+    """Trace an image, in the colours that are allowed. ``noise`` and ``most``: as for ``trace``."""
+    traced = trace_in_time(image, noise, most, settings, run)
     drawing = Drawing(traced.scene, traced.joints)
     if settings.is_limited:
         drawing = drawing.take(solid_shapes(drawing.scene))
@@ -172,25 +179,27 @@ def trace_regions(problem: Problem, run: Run, most: int | None) -> Drawing:
     return drawing
 
 
-def _sketch(problem: Problem, run: Run, done: Finished) -> Sketch:
+def _sketch(problem: Problem, picture: Picture, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
-    scene, per_pixel = _whole(done.drawing.scene, done.per_pixel, problem, run)
-    if problem.settings.max_bytes or any(margins(problem.target, THIN_SIDE)) or math.isnan(done.psnr):
+    scene, per_pixel = _whole(done.drawing.scene, done.per_pixel, picture, problem.settings, run)
+    if problem.settings.max_bytes or any(margins(picture.pixels, THIN_SIDE)) or math.isnan(done.psnr):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
-        made = Fit(scene, per_pixel, done.psnr, done.psnr, 0, run.stopped())
+        psnr = done.psnr - 10 * math.log10(picture.share)
+        made = Fit(scene, per_pixel, psnr, psnr, 0, run.stopped())
     return Sketch(made, _size(made, problem.settings), done.drawing)
 
 
-def _whole(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> tuple[Scene, float]:
-    """Return a scene of the image before it was enlarged, and its grid, at the size of the image."""
-    size = enlargement(problem.target)
-    scene = enlarged(scene, size, *problem.size)
-    if problem.settings.strokes and not run.over():
+def _whole(
+    scene: Scene, per_pixel: float, picture: Picture, settings: Settings, run: Run
+) -> tuple[Scene, float]:
+    """Return a scene of a picture, and its grid, at the size of the image."""
+    scene = picture.placed(scene)
+    if settings.strokes and not run.over():
         from warpsplat.drawing.pen import with_strokes
 
-        scene = with_strokes(scene, problem.settings, run)
-    return scene, per_pixel / size
+        scene = with_strokes(scene, settings, run)
+    return scene, per_pixel / picture.enlargement
 
 
 def _size(made: Fit, settings: Settings) -> int:

@@ -53,7 +53,7 @@ def test_a_trace_of_small_letters_is_near_their_source_at_four_times_the_size(le
     assert -10 * np.log10(((shown - large) ** 2).mean()) > 23
 
 
-@pytest.mark.parametrize(("size", "scale"), [(40, 4), (80, 1)])
+@pytest.mark.parametrize(("size", "scale"), [(40, 4), (80, 4), (96, 1)])
 def test_small_images_are_mapped_for_few_thin_parts(size: int, scale: int) -> None:
     disc = '<circle cx="20" cy="20" r="12.3" fill="#a02030"/><path d="M20.4 20.6h2.1l-.7 1.7z" fill="#fff"/>'
     image = draw_exactly(ground("#ffffff", size, size) + disc, size, size)

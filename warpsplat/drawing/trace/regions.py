@@ -52,6 +52,7 @@ def find_regions(
     price: float = 1.0,
     check: Callable[[], None] = unchecked,
     gradients: Gradients = GRADIENTS,
+    noise: float | None = None,
 ) -> Regions:
     """Cut an image up into regions.
 
@@ -60,13 +61,13 @@ def find_regions(
         price: As for ``trace``; below 1, specks that are hardly seen stay.
         check: As for ``trace``.
         gradients: As for ``trace``.
+        noise: As for ``trace``.
     """
     image = np.asarray(image, np.float32)
-    noise = noise_of(image)
-    if noise < NEGLIGIBLE_NOISE:
-        noise = 0.0
-    else:
-        image = _smoothed(image, noise)
+    if noise is None:
+        noise = noise_of(image)
+        noise = 0.0 if noise < NEGLIGIBLE_NOISE else noise
+        image = _smoothed(image, noise) if noise else image
     noise = min(noise, MOST_NOISE)
     check()
     seeds = _without_mixed_seeds(image, find_seeds(image, min(noise, MOST_SEED_NOISE)), noise)

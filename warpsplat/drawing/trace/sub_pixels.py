@@ -25,7 +25,7 @@ FOREIGN_SHARE = 0.03  # of the mixed pixels that may be no mixtures of two colou
 MOST_COLORS = 32  # that are compared by pairs
 THIN_SHARE = 0.15  # of the mixed pixels, from which on an image is drawn by sub-pixels
 LEAST_MIXED = 0.2  # pixels for each pair of neighbours of different colours, where there is antialiasing
-SMALL = 64 * 64  # [px] of an image without gradients that is drawn by sub-pixels if any is thin
+SMALL = 80 * 80  # [px] of an icon of 64 px and its margin: without gradients it is drawn so if any is thin
 FOREIGN_IN_SMALL = 0.3  # the largest foreign share there
 NEAR = 3.5  # [px] within which the colours lie that a pixel may be mixed of
 PURE = 0.04  # share up to which a colour is no part of a pixel
@@ -57,7 +57,7 @@ def with_sub_pixels(regions: Regions) -> Regions:
     scale = _largest_scale(regions)
     used = numbers_in(regions.paint).tolist()
     has_bands = any(regions.colorings[k].is_band for k in used)
-    if scale == 1 or regions.noise or has_bands or len(used) > MOST_COLORS:
+    if scale == 1 or has_bands or len(used) > MOST_COLORS:
         return regions
     inked = with_inks(regions)
     shown = _shown(inked)
@@ -160,7 +160,10 @@ def _unmixed(regions: Regions, shown: dict[int, Floats]) -> tuple[Ints, _Mixed]:
             at = rows[better], columns[better]
             cost[at], share[at], first[at], second[at] = off[better], t[better], a, b
     most = np.where(share >= 0.5, first, second)
-    is_pure = channel_max(np.abs(regions.image - _colors_at(shown, most, *np.indices(most.shape)))) <= MIXED
+    is_pure = (
+        channel_max(np.abs(regions.image - _colors_at(shown, most, *np.indices(most.shape))))
+        <= MIXED + regions.noise
+    )
     rows, columns = np.nonzero((share > PURE) & (share < 1 - PURE) & ~is_pure)
     at = rows, columns
     return most, _Mixed(rows, columns, first[at], second[at], share[at])
@@ -172,7 +175,7 @@ def _foreign_share(regions: Regions, mixed: _Mixed, shown: dict[int, Floats]) ->
     at = mixed.rows, mixed.columns
     one, other = (_colors_at(shown, which, *at) for which in (mixed.first, mixed.second))
     off = channel_max(np.abs(regions.image[at] - share * one - (1 - share) * other))
-    return float((off > MIXED).mean()) if len(off) else 0.0
+    return float((off > MIXED + regions.noise).mean()) if len(off) else 0.0
 
 
 def _thin_share(painted: Ints, mixed: _Mixed) -> float:

@@ -61,6 +61,7 @@ def trace(
     price: float = 1.0,
     check: Callable[[], None] = unchecked,
     gradients: Gradients = GRADIENTS,
+    noise: float | None = None,
 ) -> Traced:
     """Trace a drawing.
 
@@ -70,13 +71,14 @@ def trace(
         price: Of a byte, over its usual one: the higher, the fewer regions are worth theirs.
         check: Called now and then; it may raise an exception to give up.
         gradients: Kinds of gradients that regions may have, where they are worth their bytes.
+        noise: Of mixtures of colours [levels], in an image whose flat colours have none; None: measured.
     """
     levels = np.asarray(image, np.float32) * 255
     is_opaque = levels.shape[2] == 3
     if is_opaque:
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     height, width = levels.shape[:2]
-    regions = find_regions(levels, price, check, gradients)
+    regions = find_regions(levels, price, check, gradients, noise)
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
     regions = worthwhile_regions(regions, price)
     traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)

@@ -1,0 +1,114 @@
+"""What a drawing is made of: an image without what repeats, and the way back to its size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.drawing.denoise import without_noise
+from warpsplat.drawing.trace.pixels import cell_size
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.geometry import enlarged
+
+LEAST_ORIGINAL_SIDE = 96
+"""Least side of an image before it was enlarged [px]: smaller ones hardly define outlines."""
+
+MARGIN = 8
+"""Plain ground around what is drawn [px]: as far as the tracer looks."""
+
+GROUND_NOISE = 12 / 255
+"""Most that a plain ground may vary, as by the noise that tracing allows for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An image as it was before it was enlarged, with a margin of fixed width where its ground is plain.
+
+    So its margin has no part in how it is drawn.
+    """
+
+    pixels: FloatArray
+    """sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4)."""
+    noise: float | None
+    """Noise of mixtures of colours [levels of 255]; None: not known, flat colours may have it too."""
+    enlargement: int
+    """How many times each pixel was repeated along both sides."""
+    corner: npt.NDArray[np.intp]
+    """Where the upper left corner lies in the image before it was enlarged, x and y [px]."""
+    original_size: npt.NDArray[np.intp]
+    """Width and height of the image before it was enlarged [px]."""
+
+    drawn_size: npt.NDArray[np.intp]
+    """Width and height of what is drawn [px]."""
+
+    @classmethod
+    def of(cls, image: FloatArray) -> Picture:
+        """Return the picture of an image."""
+        factor = _enlargement(image)
+        pixels, noise = without_noise(np.ascontiguousarray(image[::factor, ::factor]))
+        size = np.array(pixels.shape[1::-1])
+        box = _drawn_box(pixels)
+        if box is None:
+            return cls(pixels, noise, factor, np.zeros(2, np.intp), size, size)
+        first, last = box
+        low, high = np.maximum(first - MARGIN, 0), np.minimum(last + MARGIN, size)
+        inner = pixels[low[1] : high[1], low[0] : high[0]]
+        before, after = low - (first - MARGIN), last + MARGIN - high
+        widths = [(int(before[axis]), int(after[axis])) for axis in (1, 0)]
+        wide = np.pad(inner, [*widths, (0, 0)], mode="edge")
+        return cls(np.ascontiguousarray(wide), noise, factor, first - MARGIN, size, last - first)
+
+    @property
+    def share(self) -> float:
+        """Pixels of the picture over those of the image before it was enlarged."""
+        return self.pixels[..., 0].size / int(self.original_size.prod())
+
+    @property
+    def drawn_share(self) -> float:
+        """Share of the picture that what is drawn takes."""
+        return int(self.drawn_size.prod()) / self.pixels[..., 0].size
+
+    def placed(self, scene: Scene) -> Scene:
+        """Return a scene of the picture at the size of the whole image."""
+        inner, frames = np.array(self.pixels.shape[1::-1]), scene.frames.copy()
+        frames[:, :2] += self.corner
+        points = scene.points + self.corner.astype(np.float32)
+        if (inner != self.original_size).any() and len(points):
+            low, high = (ends.reduceat(scene.points, scene.starts[:-1]) for ends in (np.minimum, np.maximum))
+            counts = np.diff(scene.starts)
+            is_ground = np.repeat(((low <= 0) & (high >= inner)).all(axis=1), counts)[:, None]
+            # What covers the picture goes on beyond it.
+            points = np.where(is_ground & (scene.points <= 0), 0, points)
+            points = np.where(is_ground & (scene.points >= inner), self.original_size, points)
+        width, height = (self.enlargement * self.original_size).tolist()
+        return enlarged(
+            replace(scene, points=points.astype(np.float32), frames=frames), self.enlargement, width, height
+        )
+
+
+def _enlargement(image: FloatArray) -> int:
+    """Return how many times an image was enlarged by repeating its pixels.
+
+    Its antialiasing is that of the smaller image, and the steps of its pixels are not part of what it shows.
+    """
+    size, side = cell_size(image), min(image.shape[:2])
+    fits = (n for n in range(1, size + 1) if size % n == 0 and side >= n * LEAST_ORIGINAL_SIDE)
+    return max(fits, default=1)
+
+
+def _drawn_box(
+    pixels: FloatArray,
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
+    """Return where what is drawn on a plain ground begins and ends, x and y; None: it has none."""
+    ring = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
+    ground = np.median(ring, axis=0)
+    spread = np.abs(ring - ground).max()
+    if spread > GROUND_NOISE:
+        return None
+    drawn = np.abs(pixels - ground).max(axis=2) > spread
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    if not len(rows):
+        return None
+    return np.array([columns[0], rows[0]]), np.array([columns[-1] + 1, rows[-1] + 1])
