@@ -26,6 +26,7 @@ EXCEPTIONS = {
     "paper/constants.py": "math.log",  # a constant of models that promise no bits
     "portable/elementary.py": "**",  # powers of -1, which are whole numbers
     "portable/filters.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
+    "drawing/denoise.py": "cv2.boxFilter",  # sums of whole numbers
     "drawing/trace/lattice.py": "@",  # sums of whole numbers
     "drawing/trace/grids.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "motion/preview.py": "cv2.resize",  # a preview

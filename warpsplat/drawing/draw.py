@@ -30,6 +30,7 @@ from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
+from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray, Scene
 
 SECONDS_PER_TRACED = 4e-6
@@ -185,7 +186,7 @@ def _sketch(problem: Problem, picture: Picture, run: Run, done: Finished) -> Ske
     if problem.settings.max_bytes or any(margins(picture.pixels, THIN_SIDE)) or math.isnan(done.psnr):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
-        psnr = done.psnr - 10 * math.log10(picture.share)
+        psnr = done.psnr - 10 * float(elementary.log10(picture.share))
         made = Fit(scene, per_pixel, psnr, psnr, 0, run.stopped())
     return Sketch(made, _size(made, problem.settings), done.drawing)
 

@@ -116,3 +116,14 @@ def test_regions_seen_least_go_first() -> None:
     assert three.labels[30, 30] == three.labels[12, 12]
     assert colors_of(two) == {(255, 255, 255, 255), (0xCC, 0, 0, 255)}
     assert fewer_regions(found, 4) is found
+
+
+def test_paper_between_dense_lines_is_paper() -> None:
+    """No pixel there is free of ink, and the nearest paper is farther than mixtures are looked for."""
+    lines = "".join(f'<path d="M{20 + 2 * i} 20v56h.9v-56z"/>' for i in range(28))
+    image = levels(draw(ground("#fff") + lines, 96, 96))
+    found = find_regions(image)
+    inner = found.fills[30:66, 30:66, 0]
+    paper = image[30:66, 30:66, 0] > 160
+    assert paper.any()
+    assert (inner[paper] > 200).mean() > 0.9

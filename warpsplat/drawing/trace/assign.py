@@ -6,6 +6,8 @@ The functions take and return ``painted``, the number of each pixel's colouring,
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, components, nearest_in
@@ -22,6 +24,31 @@ INVISIBLE = 120.0  # [levels] sum of the residuals of a region that is given up,
 INVISIBLE_PIXEL, MOST_COUNTED = 40.0, 8  # [levels] the same for each pixel, of which no more than these count
 MOSTLY = 0.4  # share of mixtures in a noisy region, from which on these are no part of it: JPEG tints the
 # tips of stars, and not all of a long one is near what it is a tip of
+
+
+def with_main_color(image: Floats, parts: Parts, noise: float) -> Parts:
+    """Give the main flat colour to the unlabelled pixels that are mostly of it, however far its parts are.
+
+    Between dense lines no pixel is free of them: paper that has no seed near it would be taken for ink. Only
+    pixels that no mixture of what is near explains are looked at.
+    """
+    known = parts.labels != NO_REGION
+    is_flat = np.array([coloring.ramp is None for coloring in parts.colorings], np.bool_)[parts.paint]
+    sizes = np.bincount(parts.labels[known], minlength=len(parts.paint)) * is_flat
+    if not sizes.any():
+        return parts
+    main = int(sizes.argmax())
+    color = parts.colorings[parts.paint[main]].color
+    rows, columns = np.nonzero(~known)
+    mixtures = unmix(image, parts.labels, parts.fills, rows, columns, noise)
+    away, toward = image[rows, columns] - color, mixtures.base - color
+    share = (away * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1e-6)  # of what is near
+    off = channel_max(np.abs(away - share[:, None] * toward))
+    own = (mixtures.residual > MIXED + noise) & (share < 0.5) & (off <= MIXED + noise)
+    labels, fills = parts.labels.copy(), parts.fills.copy()
+    labels[rows[own], columns[own]] = main
+    fills[rows[own], columns[own]] = color
+    return replace(parts, labels=labels, fills=fills)
 
 
 def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.assign import fill_gaps, without_orphans, without_specks
+from warpsplat.drawing.trace.assign import fill_gaps, with_main_color, without_orphans, without_specks
 from warpsplat.drawing.trace.bands import split_uneven
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, unchecked
 from warpsplat.drawing.trace.mixtures import MIXED, unmix
@@ -77,6 +77,7 @@ def find_regions(
     check()
     parts = add_thin_parts(image, parts, noise)
     check()
+    parts = with_main_color(image, parts, noise)
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = fill_gaps(image, parts)
     painted, fills = without_orphans(image, painted, fills, sure=parts.labels != NO_REGION)
