@@ -51,9 +51,6 @@ DRAWN_GRADIENTS: dict[Painting, tuple[Paint, ...]] = {
 }
 """Kinds of gradients that a drawing may have, where they are worth their bytes, by ``paint``."""
 
-USUAL_DETAIL = 0.5
-"""``detail`` from which on letters are not given up."""
-
 
 def draft_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions."""
@@ -95,7 +92,7 @@ def _best_if_thin(problem: Problem, picture: Picture, run: Run, most: int | None
     settings = problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        sheet, image = glyphs_of(picture.pixels, settings) if glyphs else (None, picture.pixels)
+        sheet, image = glyphs_of(picture.pixels) if glyphs else (None, picture.pixels)
         scene = trace_in_time(continued(image, across, down), picture.noise, most, settings, run).scene
         scene = sheet.placed(sheet.trace().scene, scene) if sheet else scene
         if settings.is_limited:
@@ -113,11 +110,9 @@ def _best_if_thin(problem: Problem, picture: Picture, run: Run, most: int | None
     return best_of_thin(traced(), others[: 1 if most is not None else 2])
 
 
-def glyphs_of(image: FloatArray, settings: Settings) -> tuple[Sheet | None, FloatArray]:
-    """Return the sheet of an image's glyphs, and the image without them; None where details are given up."""
-    if settings.detail < USUAL_DETAIL or any(margins(image, THIN_SIDE)):
-        return None, image
-    return find_glyphs(image)
+def glyphs_of(image: FloatArray) -> tuple[Sheet | None, FloatArray]:
+    """Return the sheet of an image's glyphs, and the image without them; one of few rows has none."""
+    return (None, image) if any(margins(image, THIN_SIDE)) else find_glyphs(image)
 
 
 def trace_in_time(

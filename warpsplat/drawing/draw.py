@@ -54,7 +54,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     most = None if settings.simplify else settings.curves
     picture = Picture.of(problem.target)
     announce_trace(picture, settings)
-    sheet, rest = glyphs_of(picture.pixels, settings)
+    sheet, rest = glyphs_of(picture.pixels)
     if sheet:
         made = _drawn_with_sheet(picture, settings, run, sheet, rest)
         if made and (not limit or _size(made, settings) <= limit):
