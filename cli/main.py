@@ -178,7 +178,7 @@ def report_error(error: BaseException, objects: Literal["stdout", "stderr"] | No
 
 NUMBERS = {"integer": "a whole number", "float": "a number"}
 NUMBER = re.compile("a valid (integer|float)(?: range)?")
-"""What click calls numbers."""
+"""Types of numbers in the words of click, and in ours."""
 
 
 def hint_for(flag: str) -> str:

@@ -10,8 +10,10 @@ import numpy.typing as npt
 import pytest
 
 import warpsplat
+from warpsplat.drawing import draft
+from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.glyphs import find_glyphs
-from warpsplat.scene import Canvas, Scene
+from warpsplat.scene import Canvas, FloatArray, Scene
 
 Floats = npt.NDArray[np.float64]
 
@@ -126,6 +128,18 @@ def test_a_page_of_letters_is_drawn_with_equal_outlines(quality: str) -> None:
 def test_a_limit_that_does_not_bind_changes_nothing(quality: str, limit: dict[str, Any]) -> None:
     given = {"subject": "drawing", "quality": quality, "threads": 1}
     assert warpsplat.vectorize(page(), **given, **limit).svg == warpsplat.vectorize(page(), **given).svg
+
+
+def test_glyphs_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[int] = []
+
+    def find(image: FloatArray) -> tuple[Sheet | None, FloatArray]:
+        looked.append(1)
+        return find_glyphs(image)
+
+    monkeypatch.setattr(draft, "find_glyphs", find)
+    warpsplat.vectorize(page(), subject="drawing", quality="draft", max_bytes=900)
+    assert looked == [1]
 
 
 @pytest.mark.parametrize("limit", [{"curves": 3}, {"colors": 2}, {"max_bytes": 900}])

@@ -1,4 +1,4 @@
-"""What should not matter for a drawing: margins, noise of a level or two, enlargement."""
+"""Changes that should not matter for a drawing: margins, noise of a level or two."""
 
 from __future__ import annotations
 
@@ -63,6 +63,13 @@ def test_what_reaches_the_border_stays_as_it_is() -> None:
     assert np.array_equal(picture.pixels, image)
     assert not picture.corner.any()
     assert picture.share == picture.drawn_share == 1
+
+
+@pytest.mark.parametrize("tint", [1, 7])
+def test_a_pale_line_to_the_border_is_not_cut_off(tint: int) -> None:
+    image = padded(image_of("thin"), 0, 60, 0, 0)
+    image[20] = 1 - tint / 255
+    assert np.array_equal(Picture.of(image).pixels, image)
 
 
 def test_a_transparent_ground_is_a_ground() -> None:

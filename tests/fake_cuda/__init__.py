@@ -28,7 +28,7 @@ from typing import Any
 from tests import ROOT
 
 NAME = "fake-cuda"
-"""What ``pytest --device`` is given."""
+"""Name of the device for ``pytest --device``."""
 
 VERSIONS = ("1.19.",)
 """Versions of Warp whose native functions are replaced here: they are not a public interface."""
@@ -53,8 +53,8 @@ class Options:
     pools: bool = True
     """Whether there are memory pools, which stream-ordered allocation needs."""
     fail: str = ""
-    """What fails: context, compile, load, capture, graph, or the N-th launch and all that follows: at once
-    (``launch:N``), or when something waits for it (``sync:N``)."""
+    """Failure to inject: context, compile, load, capture, graph, or the N-th launch and all that follow it,
+    at once (``launch:N``) or when something waits for it (``sync:N``)."""
     protect: bool = True
     """Whether host code that touches device memory is ended (SIGSEGV)."""
     log: str = ""

@@ -77,7 +77,7 @@ class Driver:
 
     @property
     def shift(self) -> int:
-        """What is added to an address of device memory to get at it."""
+        """Offset from an address of device memory to the memory itself."""
         return self.machine.region.shift
 
     # Errors

@@ -72,7 +72,7 @@ class Region:
         memory = reserve(self.size, mmap.PROT_READ | mmap.PROT_WRITE)
         self.base = reserve(self.size, NO_ACCESS) if options.protect else memory
         self.shift = memory - self.base
-        """What is added to the address that host code knows to get at the memory."""
+        """Offset from the address that host code knows to the memory itself."""
         self.top = self.base
         self.blocks: dict[int, Block] = {}
         self.addresses: list[int] = []

@@ -50,7 +50,7 @@ class CudaError(Exception):
 
 @dataclass
 class Capture:
-    """What a stream records instead of doing it."""
+    """Work that a stream records instead of doing it."""
 
     id: int
     mode: int

@@ -56,17 +56,20 @@ def draft_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions."""
     settings, picture = problem.settings, Picture.of(problem.target)
 
-    def sketch(most: int | None, glyphs: bool = False) -> Sketch:
-        made = _best_if_thin(problem, picture, run, most, glyphs)
+    def sketch(most: int | None, sheet: Sheet | None = None) -> Sketch:
+        made = _best_if_thin(problem, picture, run, most, sheet, rest if sheet else picture.pixels)
         return Sketch(made, len(finished(made.scene, settings, made.per_pixel).encode()), None)
 
     def fits(made: Sketch) -> bool:
         return not settings.max_bytes or made.size <= settings.max_bytes
 
-    most, first = most_shapes(settings), sketch(None, glyphs=True)
-    if len(first.fit.scene) <= most and fits(first):
+    sheet, rest = glyphs_of(picture.pixels)
+    most, first = most_shapes(settings), sketch(None, sheet)
+    is_few = most is None or len(first.fit.scene) <= most
+    if is_few and fits(first):
         return first.fit
-    first = sketch(None if settings.simplify else settings.curves)
+    if sheet or not is_few:
+        first = sketch(most)
     if fits(first):
         return first.fit
     assert settings.max_bytes
@@ -79,20 +82,21 @@ def byte_price(settings: Settings) -> float:
     return float(elementary.exp((1 - 2 * settings.detail) * elementary.log(DEAREST)))
 
 
-def most_shapes(settings: Settings) -> float:
-    """Return how many paths a drawing may have."""
-    return math.inf if settings.simplify else settings.curves
+def most_shapes(settings: Settings) -> int | None:
+    """Return how many paths a drawing may have; None: any number."""
+    return None if settings.simplify else settings.curves
 
 
-def _best_if_thin(problem: Problem, picture: Picture, run: Run, most: int | None, glyphs: bool) -> Fit:
+def _best_if_thin(
+    problem: Problem, picture: Picture, run: Run, most: int | None, sheet: Sheet | None, image: FloatArray
+) -> Fit:
     """Trace an image; one of few rows or columns also continued beyond its borders, or as cells.
 
-    ``glyphs``: whether letters are drawn once.
+    ``sheet``: letters that are drawn once; None: none. ``image``: the picture without them.
     """
     settings = problem.settings
 
     def traced(across: int = 0, down: int = 0) -> Fit:
-        sheet, image = glyphs_of(picture.pixels) if glyphs else (None, picture.pixels)
         scene = trace_in_time(continued(image, across, down), picture.noise, most, settings, run).scene
         scene = sheet.placed(sheet.trace().scene, scene) if sheet else scene
         if settings.is_limited:

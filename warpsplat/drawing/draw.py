@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 def draw_regions(problem: Problem, run: Run) -> Fit:
     """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes."""
     settings, limit = problem.settings, problem.settings.max_bytes
-    most = None if settings.simplify else settings.curves
+    most = most_shapes(settings)
     picture = Picture.of(problem.target)
     announce_trace(picture, settings)
     sheet, rest = glyphs_of(picture.pixels)
@@ -105,7 +105,8 @@ def _drawn_with_sheet(
     Return None if these are more paths than are allowed.
     """
     found, others = sheet.trace(), trace_regions(rest, picture.noise, settings, run, None)
-    if len(sheet.placed(found.scene, others.scene)) > most_shapes(settings):
+    most = most_shapes(settings)
+    if most is not None and len(sheet.placed(found.scene, others.scene)) > most:
         return None
     copies = len(sheet.copies) / len(sheet.corners)
     parts = [(Drawing(found.scene, found.joints), sheet.image, copies), (others, rest, 1.0)]

@@ -1,4 +1,4 @@
-"""What a drawing is made of: an image without what repeats, and the way back to its size."""
+"""An image as it is drawn: without enlargement, noise and surplus margin; and the way back to its size."""
 
 from __future__ import annotations
 
@@ -17,9 +17,6 @@ LEAST_ORIGINAL_SIDE = 96
 
 MARGIN = 8
 """Plain ground around what is drawn [px]: as far as the tracer looks."""
-
-GROUND_NOISE = 12 / 255
-"""Most that a plain ground may vary, as by the noise that tracing allows for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +95,14 @@ def _enlargement(image: FloatArray) -> int:
     return max(fits, default=1)
 
 
-def _drawn_box(
-    pixels: FloatArray,
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
-    """Return where what is drawn on a plain ground begins and ends, x and y; None: it has none."""
-    ring = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
-    ground = np.median(ring, axis=0)
-    spread = np.abs(ring - ground).max()
-    if spread > GROUND_NOISE:
-        return None
-    drawn = np.abs(pixels - ground).max(axis=2) > spread
+def _drawn_box(pixels: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
+    """Return where what is drawn on a ground of one colour begins and ends, x and y; None: it has none.
+
+    The border has exactly this colour: with a tolerance, pale lines that reach it would be lost.
+    """
+    drawn = (pixels != pixels[0, 0]).any(axis=2)
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
-    if not len(rows):
+    border = drawn[0].any() or drawn[-1].any() or drawn[:, 0].any() or drawn[:, -1].any()
+    if border or not len(rows):
         return None
     return np.array([columns[0], rows[0]]), np.array([columns[-1] + 1, rows[-1] + 1])

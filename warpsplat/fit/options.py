@@ -37,9 +37,9 @@ QUOTED = "in quotes, as an unquoted # begins a comment"
 
 
 Elsewhere = Literal["refused", "ignored", "fitted"]
-"""What becomes of an option that has no effect on a subject: if the user gave the subject, it is an error, or
-the option is ignored, which a note says. Of a subject that was detected it is ignored as well, unless the
-option asks for fitted shapes: then the image is fitted as a photograph, which a note says."""
+"""Consequences of an option that has no effect on a subject. If the user gave the subject, it is an error, or
+the option is ignored with a note. If the subject was detected the option is ignored as well, unless it asks
+for fitted shapes: then the image is fitted as a photograph, and a note says so."""
 
 
 @dataclass(frozen=True, kw_only=True)

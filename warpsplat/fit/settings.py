@@ -75,13 +75,13 @@ FRACTION = (0.0, 1.0)
 WEIGHT = (0.0, 1e6)
 
 FITTED: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "fitted"}
-"""Of options that ask for fitted shapes."""
+"""Arguments of options that ask for fitted shapes."""
 
 TUNING: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "ignored"}
-"""Of options that change how well shapes are fitted."""
+"""Arguments of options that change how well shapes are fitted."""
 
 DRAWN: dict[str, Any] = {"subjects": ("drawing",), "elsewhere": "ignored"}
-"""Of options that change how drawings are traced."""
+"""Arguments of options that change how drawings are traced."""
 
 
 LEVEL_FACTOR, LEAST_LEVEL_SHAPES = 4, 8
@@ -435,12 +435,11 @@ class Settings:
         """Return the options given that have no effect on a subject."""
         if subject == "auto":
             return []
-        quality, usual = self.quality, Settings()
-        found = []
+        quality, found = self.quality, []
         for each in options_of(Settings):
             value = getattr(self, each.field)
             by_quality = value in [preset[each.field] for preset in PRESETS.values() if each.field in preset]
-            is_given = value != getattr(usual, each.field) and not by_quality
+            is_given = value != each.default and not by_quality
             if each.subjects and subject not in each.subjects and is_given:
                 found.append(Given(self._called(each), each))
         if self.is_limited:  # implies it

@@ -1,4 +1,4 @@
-"""What Warp's runtime knows of CUDA: versions, and errors as its native code words them."""
+"""Versions of CUDA that Warp's runtime knows, and errors in the words of its native code."""
 
 from __future__ import annotations
 

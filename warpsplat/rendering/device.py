@@ -60,11 +60,11 @@ def start_warp() -> None:
 
 ERROR = "Warp CUDA error: "
 _errors: list[str] = []
-"""What Warp said of a driver that it cannot start with, as it keeps no error of it."""
+"""Errors that Warp printed of a driver that it cannot start with; it keeps none."""
 
 
 class Obstacle(NamedTuple):
-    """What stands in the way of a GPU."""
+    """A reason why a GPU cannot be used."""
 
     cause: str
     remedy: str = ""

@@ -36,7 +36,7 @@ class PreparedImage:
     why: str = ""
     """Why this subject was chosen; empty if it was given."""
     notes: tuple[str, ...] = ()
-    """What may be unexpected, for people: such as options that have no effect on the subject."""
+    """Notes for people on what may be unexpected, such as options that have no effect on the subject."""
     reduction: Reduction | None = None
     """How the image was reduced to fit into memory; None if it was not."""
     name: str = "the image"
@@ -94,7 +94,7 @@ def prepare(
     if importance is not None and chosen.subject != "photo":
         notes += (no_effect(["importance"], chosen.subject),)
     if target.shape[2] == 4 and not target[..., 3].any():
-        notes += ("every pixel is fully transparent: nothing is to be seen, and the file is empty",)
+        notes += ("every pixel is fully transparent, so the file is empty",)
     prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, notes, reduction, name)
     if importance is None:
         return prepared
@@ -164,7 +164,7 @@ def choose_subject(
         if asking:
             why = f"{_listed(asking)} {'ask' if asking[1:] else 'asks'} for fitted shapes"
             notes.append(
-                f"looks like a {SUBJECTS[subject]}, but {why}, as of a photograph; "
+                f"looks like a {SUBJECTS[subject]}, but {why}, so it is treated as a photograph; "
                 f"without {'them' if asking[1:] else 'it'} the image would be traced"
             )
             subject = "photo"

@@ -77,7 +77,7 @@ class Result:
     why: str = ""
     """The reason for the subject; empty if it was given."""
     notes: tuple[str, ...] = ()
-    """What may be unexpected, for people: such as options that have no effect on the subject."""
+    """Notes for people on what may be unexpected, such as options that have no effect on the subject."""
     history: tuple[Progress, ...] = field(default=(), compare=False)
     """The progress reports of the training, in order."""
     before: float | None = None

@@ -16,7 +16,7 @@ from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import SUBJECTS, Settings
 from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
@@ -32,8 +32,8 @@ MOST_NUMBERS = 16
 """Most numbers of shapes in one run."""
 
 
-OWN_NUMBER = {"line": "line drawing", "pixel": "piece of pixel art"}
-"""Subjects whose images decide how many shapes there are, as messages call them."""
+OWN_NUMBER = {"line", "pixel"}
+"""Subjects whose images decide how many shapes there are."""
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
@@ -93,7 +93,7 @@ def vectorize_several(
         subject = prepared.problem.settings.subject
         if subject in OWN_NUMBER:
             raise UsageError(
-                f"{prepared.name}: the image itself decides how many shapes a {OWN_NUMBER[subject]} has, so "
+                f"{prepared.name}: the image itself decides how many shapes a {SUBJECTS[subject]} has, so "
                 "there is only one file; --subject photo fits shapes"
             )
         paths = {number: path_of(output) for number, output in zip(curves, outputs or (), strict=False)}

@@ -15,19 +15,15 @@ from warpsplat.field_docs import described
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Callback
-from warpsplat.fit.settings import Settings, Subject
+from warpsplat.fit.settings import SUBJECTS, Settings, Subject
 from warpsplat.portable import elementary
 from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.prepare import prepare
-from warpsplat.run.several import OWN_NUMBER
 from warpsplat.run.typed import Options
 from warpsplat.search.survey import Worth, survey
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-CALLED = {"photo": "photo", "drawing": "drawing", **OWN_NUMBER}
-"""Subjects as messages call them."""
 
 ROW_RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Shapes of the rows of a table, over the suggested number."""
@@ -144,7 +140,7 @@ def suggest(
         if subject != "photo":
             seen = f" ({prepared.why})" if prepared.why else ""
             why = (
-                f"A {CALLED[subject]}{seen}, which is traced: the picture says how many shapes there are"
+                f"A {SUBJECTS[subject]}{seen}, which is traced: the picture says how many shapes there are"
                 f"{SIMPLER if subject == 'drawing' else ''}. --subject photo fits a number of shapes to it."
             )
             return Suggestion(None, subject, why, (), None, None, time.monotonic() - run.started)
@@ -155,7 +151,7 @@ def suggest(
         return None
     made = suggestion(worth)
     guess = guess_subject(prepared.problem.target)
-    rough = f" It looks like a {CALLED[guess.subject]} ({guess.why}), of which this is a rough guess."
+    rough = f" It looks like a {SUBJECTS[guess.subject]} ({guess.why}), of which this is a rough guess."
     why = made.why if guess.subject == "photo" else made.why + rough
     return replace(made, why=why, seconds=time.monotonic() - run.started)
 
