@@ -27,6 +27,7 @@ EXCEPTIONS = {
     "portable/elementary.py": "**",  # powers of -1, which are whole numbers
     "portable/filters.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "drawing/denoise.py": "cv2.boxFilter",  # sums of whole numbers
+    "drawing/trace/subject.py": "cv2.boxFilter",  # the same
     "drawing/trace/lattice.py": "@",  # sums of whole numbers
     "drawing/trace/grids.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "motion/preview.py": "cv2.resize",  # a preview

@@ -56,29 +56,6 @@ def nearest(
 def errors(
     # In:
     offset: wp.int32,
-    cubics: wp.array[wp.vec2d],  # [4 x cubic] [px]
-    first: wp.array[wp.int64],  # [cubic + 1]
-    t: wp.array[wp.float64],  # [sample]
-    place: wp.array[wp.vec2d],  # [sample] [px]
-    across: wp.array[wp.vec2d],  # [sample]
-    weight: wp.array[wp.float64],  # [sample]
-    # Out:
-    error: wp.array[wp.float64],  # [cubic]
-):
-    """Sum the weighted squares of the distances. One thread a cubic."""
-    i = offset + wp.tid()
-    f = polynomial(cubics, i)
-    total = ZERO
-    for s in range(int(first[i]), int(first[i + 1])):
-        off = wp.dot(point_at(f, t[s]) - place[s], across[s])
-        total += weight[s] * off * off
-    error[i] = total
-
-
-@wp.kernel
-def errors_elsewhere(
-    # In:
-    offset: wp.int32,
     cubics: wp.array[wp.vec2d],  # [4 x n] in place of others [px]
     instead: wp.array[wp.int64],  # [n] the cubic whose samples are taken
     low: wp.array[wp.float64],  # [n] where on the new cubic the old one would begin

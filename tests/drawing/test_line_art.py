@@ -96,7 +96,7 @@ def test_mixed_line_art_keeps_its_areas(device: str) -> None:
     result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
     assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
     assert np.bincount(result.scene.kind).tolist() == [1, 2]
-    assert result.scene.point_counts()[0] <= 24  # a circle, cut where its line leaves it
+    assert result.scene.point_counts()[0] <= 30  # a circle, cut where its line leaves it
     assert scored(result).psnr > 34
     without = lines_of(image, device)
     assert (without.scene.kind == Kind.STROKE).all()

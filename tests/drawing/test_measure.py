@@ -11,10 +11,11 @@ from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, 
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
+from warpsplat.drawing.measure import Surroundings
 from warpsplat.drawing.model import errors, fitted
 from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
-from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray
 
@@ -126,3 +127,11 @@ def test_outlines_follow_their_places() -> None:
     assert after[2].sum() < 0.1 * before
     again = OutlineFit(render(made.scene), after[0], Run(Backend.on("cpu", 1)))
     assert again.error < 0.15 * fit.error
+
+
+def test_each_cubic_has_the_pixels_around_it() -> None:
+    """A level line of 20 px with a pixel on each side, cut off at the border of the image."""
+    line = np.array([[(10, 20.5), (16, 20.5), (23, 20.5), (30, 20.5)], [(60, 20.5)] * 4], float)
+    near = Surroundings(line, Viewport(64, 48))
+    tiles = np.ones((len(near.tiles), 16, 16), np.float32)
+    assert near.sums(tiles).tolist() == [3 * 22, 9]

@@ -9,11 +9,12 @@ import numpy as np
 
 from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, Outline, disc, drawing, logo, polygon, seam
 from tests.drawing.test_fit_outlines import assert_clean, psnr
-from tests.drawing.test_merge import halves
+from tests.drawing.trace.test_cubics import halves
+from warpsplat.drawing import prices
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
 from warpsplat.drawing.model import before_fit, errors
-from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits, Outlines, apart, applied
+from warpsplat.drawing.nodes import STRAIGHT, WITHOUT, Edits, apart, applied, candidates
 from warpsplat.drawing.tidy import finish_drawing, tidied
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
@@ -49,7 +50,7 @@ def nodes(made: Drawing) -> int:
 
 
 def edits_of(made: Drawing, kind: int) -> Edits:
-    edits = Outlines(made).edits(np.zeros((nodes(made), 4), np.bool_))
+    edits = candidates(made, np.zeros((nodes(made), 2), np.bool_))
     return edits.take(edits.kind == kind)
 
 
@@ -67,7 +68,7 @@ CANVAS = Canvas(64, 48, WHITE)
 def test_needless_nodes_cost_nothing() -> None:
     """Of a square all but its corners, of a disc every other."""
     square, ring = polygon((8, 8), (40, 8), (40, 40), (8, 40)), disc(30, 24, 15)
-    for outline, saved, count in ((square, 7, 4), (ring, 19, 8)):
+    for outline, saved, count in ((square, prices.LINE, 4), (ring, prices.CUBIC, 8)):
         made = split(drawing(CANVAS, (RED, [outline])))
         edits = edits_of(made, WITHOUT)
         assert set(edits.at.tolist()) == set(range(8))
@@ -77,7 +78,7 @@ def test_needless_nodes_cost_nothing() -> None:
         for i in range(count):
             left, keep = applied(made, cheap.take(np.array([i])))
             assert nodes(left) == nodes(made) - 1 == keep.sum()
-            assert left.lines().sum() == (7 if saved == 7 else 0)
+            assert left.lines().sum() == (7 if outline is square else 0)
 
 
 def test_an_outline_of_two_pieces_keeps_them() -> None:
@@ -100,23 +101,9 @@ def test_almost_straight_cubics_cost_little() -> None:
     assert left.lines().tolist() == [True, False, True, True]
 
 
-def test_almost_level_lines_and_tangents_are_named() -> None:
-    made = drawing(CANVAS, (RED, [polygon((8, 8), (40, 8.3), (38, 40), (8, 40))]))
-    edits = edits_of(made, LEVEL)
-    assert edits.at.tolist() == [0]
-    left, _ = applied(made, edits)
-    assert left.scene.points[0, 1] == left.scene.points[3, 1]
-    assert not len(edits_of(left, LEVEL).at)
-    slanted = drawing(CANVAS, (RED, [disc(30, 24, 15, 0.02)]))
-    edits = edits_of(slanted, TANGENT)
-    assert len(edits.at) == 4
-    assert not len(edits_of(applied(slanted, edits)[0], TANGENT).at)
-    assert not len(edits_of(drawing(CANVAS, (RED, [disc(30, 24, 15, 0.3)])), TANGENT).at)
-
-
 def test_chosen_candidates_have_no_cubic_in_common() -> None:
     made = split(logo())
-    edits = Outlines(made).edits(np.zeros((nodes(made), 4), np.bool_))
+    edits = candidates(made, np.zeros((nodes(made), 2), np.bool_))
     cost = np.random.default_rng(0).random(len(edits.at))
     chosen = apart(edits, cost)
     assert 1 < len(chosen) < len(cost)
@@ -129,10 +116,10 @@ def test_chosen_candidates_have_no_cubic_in_common() -> None:
 
 def test_what_was_refused_is_no_candidate() -> None:
     made = split(logo())
-    refused = np.zeros((nodes(made), 4), np.bool_)
-    edits = Outlines(made).edits(refused)
+    refused = np.zeros((nodes(made), 2), np.bool_)
+    edits = candidates(made, refused)
     refused[edits.at[::2], edits.kind[::2]] = True
-    left = Outlines(made).edits(refused)
+    left = candidates(made, refused)
     assert list(zip(left.kind, left.at, strict=True)) == list(
         zip(edits.kind[1::2], edits.at[1::2], strict=True)
     )

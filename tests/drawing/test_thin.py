@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.runs import scored, vectorize
+from warpsplat.drawing.thin import BEYOND, THIN_SIDE, continued, cut, margins
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import choose_subject
@@ -53,3 +54,15 @@ def test_lines_across(device: str) -> None:
     image[:, 3::14] = 0
     image[:, 4::14] = 0
     assert psnr_of(image, "line", device) > 20
+
+
+def test_what_is_continued_is_cut_again() -> None:
+    image = ramp(30, 3)
+    across, down = margins(image, THIN_SIDE)
+    assert (across, down) == (0, BEYOND)
+    wide = continued(image, across, down)
+    assert wide.shape == (3 + 2 * BEYOND, 30, 3) and (wide[:BEYOND] == image[0]).all()
+    made = vectorize(wide, make_settings(subject="drawing"), Backend.on("cpu")).scene
+    small = cut(made, across, down)
+    assert (small.canvas.width, small.canvas.height) == (30, 3)
+    np.testing.assert_allclose(small.points, made.points - (0, BEYOND))

@@ -21,10 +21,12 @@ Floats = npt.NDArray[np.float64]
 
 CELL_SIDE = 2  # [canvas units] side of a cell, which divides that of a tile
 
-ORIGIN, ROW_SPAN = 1 << 20, 1 << 21
+ORIGIN = 1 << 20
+ROW_SPAN = 2 * ORIGIN
 """A cell's number is (column + ORIGIN) ROW_SPAN + row + ORIGIN: outlines stay within ten canvases."""
 
-CELL_OFFSETS = np.array([i * ROW_SPAN + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
+BESIDE = np.arange(-1, 2)
+CELL_OFFSETS = np.add.outer(BESIDE * ROW_SPAN, BESIDE).ravel()
 """Offsets of a cell and its neighbours, which an outline in it may change as well."""
 
 

@@ -80,6 +80,13 @@ class Drawing:
         after[starts[1:][filled] - 1] = starts[:-1][filled]
         return after
 
+    def neighbours(self) -> tuple[Links, Links]:
+        """Return the cubic before, and after, each one on its contour, shape (cubic,)."""
+        after = self.following()
+        before = np.empty_like(after)
+        before[after] = np.arange(len(after))
+        return before, after
+
     def lines(self) -> Flags:
         """Return which cubics are straight lines, shape (cubic,)."""
         joints = self.joints.reshape(-1, 3)
@@ -119,11 +126,9 @@ class Constraints:
         scene = drawing.scene
         points = scene.points.astype(np.float64).reshape(-1, 3, 2)
         count = len(points)
-        self._next = drawing.following()
         self._contour_first = scene.starts.astype(np.intp) // 3
         self._sorted: tuple[Links, Links, Links, Links] | None = None
-        self._previous = np.empty(count, np.intp)
-        self._previous[self._next] = np.arange(count)
+        self._previous, self._next = drawing.neighbours()
         self._is_line = drawing.lines()
         on = points[:, 0]
         tied = self._is_line[:, None] & (np.abs(on - on[self._next]) < SAME_COORDINATE)

@@ -22,8 +22,9 @@ from warpsplat.drawing.draft import (
 )
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.picture import Picture
+from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
-from warpsplat.drawing.tidy import LEAST_ERROR, Finished
+from warpsplat.drawing.tidy import Finished
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes

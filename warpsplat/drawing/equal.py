@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.shapes import CUBIC_BYTES, Errors, cubics_of, with_contours
+from warpsplat.drawing.shapes import Errors, cubics_of, with_contours
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import IndexArray, Scene
 from warpsplat.svg.primitives import primitives
-from warpsplat.svg.symbols import USE_BYTES, parts_of, rows_of
+from warpsplat.svg.sizes import USE
+from warpsplat.svg.symbols import parts_of, rows_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,18 +26,12 @@ MOST_APART = 0.6
 
 SAMPLES_PER_CUBIC = 8
 
-CHECKS = 3
-"""Most times that outlines are fitted and those that cost too much taken back."""
-
 Refit = Callable[[Drawing], Drawing]
 """Fits the outlines of a drawing for some steps."""
 
 
-class Equal(NamedTuple):
-    """Equal outlines."""
-
-    contours: list[IndexArray]
-    """Indices of each outline's contours, in corresponding order, shape (outline, contour)."""
+Equal = list[IndexArray]
+"""Indices of the contours of each of some equal outlines, in corresponding order."""
 
 
 def with_equal_outlines(
@@ -56,13 +51,11 @@ def with_equal_outlines(
     groups = _likely(drawing.scene)
     cells = {int(part[0]): _cells(drawing.scene, part) for group in groups for part in group}
     saved = {
-        int(part[0]): CUBIC_BYTES * len(rows_of(drawing.scene, part)) / 3 - USE_BYTES
+        int(part[0]): prices.CUBIC * len(rows_of(drawing.scene, part)) / 3 - USE
         for group in groups
         for part in group
     }
-    for _ in range(CHECKS):
-        if not groups:
-            break
+    while groups:
         made = _averaged(refit(_with_nodes_of_one(drawing, groups)), groups)
         growth = errors_of(made) - errors
         kept = []
@@ -70,16 +63,16 @@ def with_equal_outlines(
             near = [p for p in group if sum_within(growth, cells[int(p[0])]) <= saved[int(p[0])] * worth]
             kept.append(near)
         if all(len(a) == len(b) for a, b in zip(kept, groups, strict=True)):
-            return made, [Equal(group) for group in groups]
+            return made, groups
         groups = [group for group in kept if len(group) > 1]
     return drawing, []
 
 
-def _likely(scene: Scene) -> list[list[IndexArray]]:
+def _likely(scene: Scene) -> list[Equal]:
     """Return groups of parts of shapes with about the same moments, each with its most usual one first."""
     basic = {contour for contour, _ in primitives(scene, scene.points.astype(np.float64))}
     parts = [part for part in parts_of(scene) if len(part) > 1 or int(part[0]) not in basic]
-    parts = [p for p in parts if CUBIC_BYTES * len(rows_of(scene, p)) / 3 > USE_BYTES]
+    parts = [p for p in parts if prices.CUBIC * len(rows_of(scene, p)) / 3 > USE]
     if len(parts) < 2:
         return []
     counts = np.array([len(part) for part in parts])
@@ -124,7 +117,7 @@ def _cells(scene: Scene, part: IndexArray) -> Cells:
     return joined([own for contour in part.tolist() for own in cells_around(cubics_of(scene, contour))])
 
 
-def _with_nodes_of_one(drawing: Drawing, groups: list[list[IndexArray]]) -> Drawing:
+def _with_nodes_of_one(drawing: Drawing, groups: list[Equal]) -> Drawing:
     """Return a drawing in which the outlines of a group have the nodes of its first one, moved."""
     scene, contours = drawing.scene, {}
     for group in groups:
@@ -137,7 +130,7 @@ def _with_nodes_of_one(drawing: Drawing, groups: list[list[IndexArray]]) -> Draw
     return with_contours(drawing, contours)
 
 
-def _averaged(drawing: Drawing, groups: list[list[IndexArray]]) -> Drawing:
+def _averaged(drawing: Drawing, groups: list[Equal]) -> Drawing:
     """Return a drawing in which the outlines of each group, which have the same nodes, are their mean."""
     points = drawing.scene.points.astype(np.float64)
     for group in groups:
@@ -157,7 +150,7 @@ def on_grid(scene: Scene, equal: list[Equal], per_pixel: float) -> tuple[Scene, 
     """
     points, held = scene.points.astype(np.float64), np.zeros(len(scene.points), np.bool_)
     for one in equal:
-        rows = np.stack([rows_of(scene, part) for part in one.contours])
+        rows = np.stack([rows_of(scene, part) for part in one])
         steps = (points[rows] - points[rows[0]]).mean(axis=1, keepdims=True)
         points[rows] = points[rows[0]] + np.round(steps * per_pixel) / per_pixel
         held[rows] = True

@@ -17,9 +17,6 @@ from warpsplat.portable import elementary
 from warpsplat.rendering.renderer import Capacity, render
 from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 
-STEPS = 12
-"""Most steps of a refinement."""
-
 LEAST_GAIN, MOST_IDLE = 0.005, 4
 """A refinement ends when so many steps in a row have not lowered the least error by this share."""
 
@@ -145,7 +142,7 @@ class OutlineFit:
         self.points = self._constraints.project(points)
         self.error, self._around = self._measure.error(self.points)
 
-    def advance(self, run: Run, steps: int = STEPS, far: int = 0) -> None:
+    def advance(self, run: Run, steps: int, far: int = 0) -> None:
         """Make at most so many ``steps``, each with a render; fewer when ``run`` is over.
 
         ``far``: first steps that follow the blurred residual.

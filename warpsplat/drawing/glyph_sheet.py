@@ -11,9 +11,9 @@ import numpy.typing as npt
 from warpsplat.alpha import straight
 from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.sub_pixels import by_sub_pixels
-from warpsplat.drawing.trace.trace import Traced, trace_regions
+from warpsplat.drawing.trace.trace import Traced, trace_partition
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import ranges, starts_of
 
@@ -56,7 +56,7 @@ class Sheet:
         colors = np.array([[255, 255, 255, 255], [0, 0, 0, 255]], np.float64)
         fills = colors.astype(np.float32)[painted]
         regions = Regions(levels, labels, fills, paint, [Coloring(color) for color in colors], 0.0)
-        return trace_regions(by_sub_pixels(regions))
+        return trace_partition(find_partition(regions))
 
     def placed(self, drawn: Scene, rest: Scene) -> Scene:
         """Return the whole image's scene, of the sheet's and that of the rest."""

@@ -9,17 +9,20 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.shapes import merge_near
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
+from warpsplat.drawing.trace.grids import Floats
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
+from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, IndexArray, Scene
 
 STROKE_STEPS = 80
@@ -39,6 +42,10 @@ THIN_STROKE = 1.0
 
 STROKE_PIXELS = 1_000_000
 """Largest image size of the refinement [pixels]."""
+
+
+ALIKE = 0.3
+"""Difference of the widths of usual strokes up to which one pen drew them [px]."""
 
 
 def draw_lines(problem: Problem, run: Run) -> Fit:
@@ -95,7 +102,24 @@ def _in_order(lines: Scene, refined: Scene) -> Scene:
     # A fit knows no strokes thinner than a pixel; their widths were measured.
     widths = np.where(lines.widths < THIN_STROKE, lines.widths, refined.widths)
     scene = replace(refined, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
-    return toured(rejoined(lines, scene))
+    return toured(with_equal_widths(rejoined(lines, scene)))
+
+
+def with_equal_widths(strokes: Scene) -> Scene:
+    """Return strokes of which those that are about as wide have one width."""
+    if not len(strokes):
+        return strokes
+    widths = strokes.widths.astype(np.float64)
+    lengths = lengths_of(strokes) + widths
+    widths, _ = merge_near(widths, lengths / lengths.mean(), ALIKE * ALIKE / 2)
+    return replace(strokes, widths=widths.astype(np.float32))
+
+
+def lengths_of(strokes: Scene) -> Floats:
+    """Return the lengths of the control polygons of strokes [px], shape (stroke,)."""
+    steps = np.append(hypot(*np.diff(strokes.points.astype(np.float64), axis=0).T), 0.0)
+    steps[strokes.first[1:] - 1] = 0
+    return np.asarray(np.add.reduceat(steps, strokes.first[:-1]))
 
 
 def line_settings(settings: Settings, count: int) -> Settings:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing, Flags, Floats, Links, rows_of, summed, with_ends
+from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.kernels.drawing import samples as kernels
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.models import EXACT
@@ -63,12 +64,6 @@ class Samples:
         return np.searchsorted(self.cubic, np.arange(count + 1))
 
 
-def bernstein(t: Floats) -> Floats:
-    """Return the weights of a cubic's control points at ``t``, shape (sample, 4)."""
-    s = 1 - t
-    return np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=-1)
-
-
 def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
     """Return which shapes have gradients, shape (shape,)."""
     return np.isin(scene.paint, GRADIENTS)
@@ -90,7 +85,7 @@ class Surroundings:
         which = np.repeat(np.arange(len(cubics)), counts)
         number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
         t = (number + 0.5) / counts[which]
-        x, y = np.floor((bernstein(t)[..., None] * cubics[which]).sum(axis=1)).astype(np.intp).T
+        x, y = np.floor(points_at(cubics[which], t[:, None])[:, 0]).astype(np.intp).T
         limits = np.array([viewport.width, viewport.height])
         corners = np.stack(
             [np.stack([x + i, y + j], axis=1) for i in (-MARGIN, MARGIN) for j in (-MARGIN, MARGIN)]

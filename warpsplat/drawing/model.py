@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, rows_of, with_ends
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, rows_of, with_ends
 from warpsplat.drawing.measure import Samples
-from warpsplat.drawing.nodes import LEVEL, STRAIGHT, TANGENT, WITHOUT, Edits
+from warpsplat.drawing.nodes import WITHOUT, Edits
 from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.kernels.drawing import samples as kernels
 from warpsplat.rendering.program import launch_on_host
@@ -30,51 +30,22 @@ def placed(samples: Samples, cubics: Floats, rounds: int = PLACING_ROUNDS) -> Sa
 
 def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
     """Return by how much each edit alone lets the error grow if nothing else follows it, shape (edit,)."""
-    cubics, count = drawing.cubics(), len(drawing.joints) // 3
-    following = drawing.following()
-    previous = np.empty_like(following)
-    previous[following] = np.arange(count)
-    before, after = previous[edits.at], following[edits.at]
-    cubic = np.stack([cubics[before], cubics[edits.at], cubics[after]], axis=1)
-    kind = edits.kind
-    made = np.flatnonzero(kind == WITHOUT)
-    whole = np.concatenate([cubic[made, 0, :1], edits.handles[made], cubic[made, 1, 3:]], axis=1)
-    cubic[made, 0] = cubic[made, 1] = whole
-    made = np.flatnonzero(kind == STRAIGHT)
-    cubic[made, 1, 1:3] = edits.handles[made]
-    rows = np.flatnonzero(kind == LEVEL)
-    axis, value = edits.axis[rows], edits.value[rows]
-    for k, corners in ((0, (3,)), (1, (0, 3)), (2, (0,))):
-        for corner in corners:
-            cubic[rows, k, corner, axis] = value
-    ends = cubic[rows, 1][:, [0, 3]]
-    cubic[rows, 1, 1], cubic[rows, 1, 2] = (
-        (2 * ends[:, 0] + ends[:, 1]) / 3,
-        (ends[:, 0] + 2 * ends[:, 1]) / 3,
-    )
-    rows = np.flatnonzero(kind == TANGENT)
-    value = cubic[rows, 1, 0, edits.axis[rows]]
-    cubic[rows, 0, 2, edits.axis[rows]] = cubic[rows, 1, 1, edits.axis[rows]] = value
-    lengths = [chords(cubics[rows]) for rows in (before, edits.at)]
-    share = lengths[0] / np.maximum(lengths[0] + lengths[1], 1e-9)
-    low, high = np.zeros((len(kind), 3)), np.ones((len(kind), 3))
-    joined = kind == WITHOUT
-    high[joined, 0] = low[joined, 1] = share[joined]
-    instead = np.stack([before, edits.at, after], axis=1)
-    found = np.zeros(3 * len(kind))
-    launch_on_host(
-        kernels.errors_elsewhere,
-        len(found),
-        samples,
-        cubics=rows_of(cubic),
-        instead=instead.ravel(),
-        low=low.ravel(),
-        high=high.ravel(),
-        first=samples.starts(count),
-        rounds=PLACING_ROUNDS,
-        error=found,
-    )
-    return np.asarray((found.reshape(-1, 3) - errors(samples, cubics)[instead]).sum(axis=1))
+    cubics, share = drawing.cubics(), _shares(drawing, edits.at)
+    joined = np.flatnonzero(edits.kind == WITHOUT)
+    instead = np.concatenate([edits.at, drawing.neighbours()[0][edits.at[joined]]])
+    low, high = np.zeros(len(instead)), np.ones(len(instead))
+    low[joined] = high[len(edits.at) :] = share[joined]
+    made = np.concatenate([edits.cubics, edits.cubics[joined]])
+    growth = _errors(samples, made, instead, low, high, len(cubics)) - errors(samples, cubics)[instead]
+    growth[joined] += growth[len(edits.at) :]
+    return growth[: len(edits.at)]
+
+
+def _shares(drawing: Drawing, at: Links) -> Floats:
+    """Return the length of the piece before each of some, over that of both."""
+    cubics, before = drawing.cubics(), drawing.neighbours()[0]
+    lengths = [chords(cubics[rows]) for rows in (before[at], at)]
+    return np.asarray(lengths[0] / np.maximum(lengths[0] + lengths[1], 1e-9))
 
 
 def chords(cubics: Floats) -> Floats:
@@ -84,23 +55,33 @@ def chords(cubics: Floats) -> Floats:
 
 def errors(samples: Samples, cubics: Floats) -> Floats:
     """Return the errors of the samples on ``cubics``, shape (cubic,)."""
-    count, found = len(cubics), np.zeros(len(cubics))
-    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "error": found}
-    launch_on_host(kernels.errors, count, samples, values)
+    count = len(cubics)
+    return _errors(samples, cubics, np.arange(count), np.zeros(count), np.ones(count), count, rounds=0)
+
+
+def _errors(
+    samples: Samples,
+    cubics: Floats,
+    instead: Links,
+    low: Floats,
+    high: Floats,
+    count: int,
+    rounds: int = PLACING_ROUNDS,
+) -> Floats:
+    """Return the errors of the samples of ``instead``, of ``count`` cubics, on other ones, shape (cubic,)."""
+    found = np.zeros(len(cubics))
+    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "instead": instead}
+    values |= {"low": low, "high": high, "error": found}
+    launch_on_host(kernels.errors, len(found), samples, values, rounds=rounds)
     return found
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
     """Return samples of ``drawing`` on the cubics that ``edits`` leave."""
-    cubics = drawing.cubics()
-    following = drawing.following()
-    previous = np.empty_like(following)
-    previous[following] = np.arange(len(keep))
-    lengths = chords(cubics)
     gone = edits.at[edits.kind == WITHOUT]
-    before = previous[gone]
+    before = drawing.neighbours()[0][gone]
     low, high = np.zeros(len(keep)), np.ones(len(keep))
-    high[before] = low[gone] = lengths[before] / np.maximum(lengths[before] + lengths[gone], 1e-9)
+    high[before] = low[gone] = _shares(drawing, gone)
     t = low[samples.cubic] + (high - low)[samples.cubic] * samples.t
     owner = np.arange(len(keep))
     owner[gone] = before
@@ -138,14 +119,3 @@ def _fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Floats, S
         points = constraints.project(points + freedom.times(change).reshape(-1, 2))
         samples = placed(samples, with_ends(points, following))
     return points, samples
-
-
-def known(
-    samples: Samples, drawing: Drawing, fit: tuple[Samples, Drawing], chosen: Flags
-) -> tuple[Samples, Drawing]:
-    """Return samples and outlines with the ``chosen`` contours as they were fitted before."""
-    now, before = (chosen[made.contour()] for made in (drawing, fit[1]))
-    points, t = drawing.scene.points.copy(), samples.t.copy()
-    points[np.repeat(now, 3)] = fit[1].scene.points[np.repeat(before, 3)]
-    t[now[samples.cubic]] = fit[0].t[before[fit[0].cubic]]
-    return replace(samples, t=t), replace(drawing, scene=replace(drawing.scene, points=points))

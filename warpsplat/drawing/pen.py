@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.line_art import line_settings
-from warpsplat.drawing.shapes import merge_near
+from warpsplat.drawing.line_art import lengths_of, line_settings, with_equal_widths
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.drawing.strokes.ridges import FAINT, across, middles, with_thin
@@ -42,8 +41,8 @@ LONG = 1.5
 SLENDER = 17.0
 """Square of the outline's length over the area of what may be strokes, at the least: a square has 16."""
 
-ALIKE, LEVEL, STRAIGHT = 0.4, 0.2, 0.15
-"""Differences of widths, of the ends of level lines, and of lines from curves, that do not count [px]."""
+LEVEL, STRAIGHT = 0.2, 0.15
+"""Differences of the ends of level lines, and of lines from curves, that do not count [px]."""
 
 Flags = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
@@ -94,7 +93,7 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
     parts: IndexArray = np.asarray(grown, np.intp)
     part, outline_part = _parts_of(parts, count, strokes), _parts_of(parts, count, alone)
-    lengths = _lengths(strokes)
+    lengths = lengths_of(strokes)
     pieces = (np.diff(strokes.starts) - 1 + strokes.closed) // 3
     length: Floats = np.bincount(part, lengths, count).astype(np.float64)
     area = np.bincount(part, lengths * strokes.widths, count)
@@ -120,8 +119,7 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
 
 def _clean(strokes: Scene) -> Scene:
     """Return fitted strokes with equal widths, and with straight and level lines where they nearly are."""
-    lengths = _lengths(strokes)
-    widths, _ = merge_near(strokes.widths.astype(np.float64), lengths / lengths.mean(), ALIKE * ALIKE / 2)
+    strokes = with_equal_widths(strokes)
     points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
     chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
     across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
@@ -133,14 +131,7 @@ def _clean(strokes: Scene) -> Scene:
         points[first[near], axis] = points[last[near], axis] = mean
     a, b = points[first], points[last]
     points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
-    return replace(strokes, points=points.astype(np.float32), widths=widths.astype(np.float32))
-
-
-def _lengths(strokes: Scene) -> Floats:
-    """Return the lengths of the control polygons of strokes [px], shape (stroke,)."""
-    steps = np.append(hypot(*np.diff(strokes.points.astype(np.float64), axis=0).T), 0.0)
-    steps[strokes.first[1:] - 1] = 0
-    return np.asarray(np.add.reduceat(steps, strokes.first[:-1]))
+    return replace(strokes, points=points.astype(np.float32))
 
 
 def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:

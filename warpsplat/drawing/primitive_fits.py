@@ -9,21 +9,18 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.drawing import prices
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import solve
 from warpsplat.svg.primitives import Primitive
 
 Floats = npt.NDArray[np.float64]
 
-ROUNDS, ROUGH_ROUNDS = 12, 4  # of Gauss and Newton's method, and those that tell what is far from any shape
+ROUNDS = 12  # of Gauss and Newton's method
 STEP = 1e-4  # [px] of numeric derivatives of boxes by sizes
 DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
-TOGETHER = 64  # outlines that are handled at once: their arrays stay in the processor's cache
 LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
-FIRST_REACH, LAST_REACH = (
-    0.5,
-    0.5,
-)  # [half the size] at first, [px] in the end: samples farther off count little
+REACH = 0.5  # [half the size] at first, [px] in the end: samples farther off count little
 
 
 class OutlinePoints(NamedTuple):
@@ -39,15 +36,18 @@ class OutlinePoints(NamedTuple):
         return OutlinePoints(self.points[rows], self.weights[rows])
 
 
+Boxes = Callable[[Floats], tuple[Floats, Floats]]
+
+
 @dataclass(frozen=True)
 class Family:
     """A kind of basic shape, by half its sides and the radii of its corners."""
 
-    values: tuple[str, ...]
-    """Kinds of its free values: the centre's two coordinates first, then sizes."""
-    size: int
-    """About its bytes in a file: path data with arcs have as many as an element."""
-    boxes: Callable[[Floats], tuple[Floats, Floats]]
+    count: int
+    """Number of its free values: the centre's two coordinates first, then sizes."""
+    size: float
+    """About its bytes in a file."""
+    boxes: Boxes
     """Half the sides and the radii, both (outline, 2), by the free sizes (outline, size)."""
 
 
@@ -56,40 +56,38 @@ def _circle(sizes: Floats) -> tuple[Floats, Floats]:
     return half, half
 
 
-def _pill(sizes: Floats) -> tuple[Floats, Floats]:
-    return sizes, np.repeat(sizes.min(axis=1, keepdims=True), 2, axis=1)
-
-
 def _rounded(sizes: Floats) -> tuple[Floats, Floats]:
     half = sizes[:, :2]
     return half, np.repeat(np.minimum(sizes[:, 2:], half.min(axis=1, keepdims=True)), 2, axis=1)
 
 
+def _priced(count: int, boxes: Boxes) -> Family:
+    """Return a family with the bytes of one of its shapes on a usual grid."""
+    typical = np.array([[50.0, 40.0, 10.0]])[:, : count - 2]
+    (a, b), (rx, ry) = (x[0].tolist() for x in boxes(typical))
+    return Family(
+        count, prices.of_primitive(Primitive((150 - a, 150 - b), (150 + a, 150 + b), (rx, ry))), boxes
+    )
+
+
 FAMILIES = (
-    Family(("x", "y", "side", "side"), 22, lambda sizes: (sizes, np.zeros_like(sizes))),
-    Family(("x", "y", "side"), 38, _circle),
-    Family(("x", "y", "side", "side"), 42, lambda sizes: (sizes, sizes)),
-    Family(("x", "y", "side", "side"), 50, _pill),
-    Family(("x", "y", "side", "side", "radius"), 56, _rounded),
+    _priced(4, lambda sizes: (sizes, np.zeros_like(sizes))),
+    _priced(3, _circle),
+    _priced(4, lambda sizes: (sizes, sizes)),
+    _priced(5, _rounded),
 )
-"""Rectangles, circles, ellipses, and rectangles with round ends and with round corners, by their bytes."""
+"""Rectangles, circles, ellipses, and rectangles with round corners, by their bytes."""
 
 
-def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
-    """Return signed distances, about, of points from boxes around 0 with rounded corners.
+def distances_and_slopes(points: Floats, half: Floats, radii: Floats) -> tuple[Floats, Floats]:
+    """Return signed distances, about, of points from boxes around 0 with rounded corners; their derivatives.
+
+    These have shape (5, outline, sample): by the coordinates' amounts, half the sides, and the radius.
 
     Args:
         points: Shape (outline, sample, 2).
         half: Half the sides, shape (outline, 2).
         radii: Shape (outline, 2); unequal ones only of ellipses.
-    """
-    return distances_and_slopes(points, half, radii)[0]
-
-
-def distances_and_slopes(points: Floats, half: Floats, radii: Floats) -> tuple[Floats, Floats]:
-    """Return ``distances`` and their derivatives, those of ellipses about right near the outline.
-
-    Shape (5, outline, sample): by the coordinates' amounts, half the sides, and the radius.
     """
     x, y = np.abs(points[..., 0]), np.abs(points[..., 1])
     a, b = half[:, :1], half[:, 1:]
@@ -120,35 +118,18 @@ class Fits(NamedTuple):
 
     values: Floats
     """Shape (outline, value) [px]."""
-    stiffness: Floats
-    """Growth of the weighted squares with the square of each value's change, shape (outline, value)."""
     off: Floats
     """Distances of the samples, shape (outline, sample) [px]."""
 
 
-def nearest(
-    family: Family, samples: OutlinePoints, begun: Floats | None = None, rounds: int = ROUNDS
-) -> Fits:
+def nearest(family: Family, samples: OutlinePoints) -> Fits:
     """Return the shapes of a family nearest to most of the samples, by weighted least squares.
 
-    OutlinePoints far off count little: another shape may hide what is there (Geman and McClure 1987).
-
-    ``begun``: values after ``ROUGH_ROUNDS``, shape (outline, value); without, those of the samples' boxes.
+    Samples far off count little: another shape may hide what is there (Geman and McClure 1987).
     """
-    parts = []
-    for i in range(0, len(samples.points), TOGETHER):
-        part = OutlinePoints(samples.points[i : i + TOGETHER], samples.weights[i : i + TOGETHER])
-        if begun is None:
-            parts.append(_nearest(family, part, _start(family, part), range(rounds)))
-        else:
-            parts.append(_nearest(family, part, begun[i : i + TOGETHER], range(ROUGH_ROUNDS, rounds)))
-    return Fits(*(np.concatenate(own) for own in zip(*parts, strict=True)))
-
-
-def _nearest(family: Family, samples: OutlinePoints, values: Floats, rounds: range) -> Fits:
-    """Return the nearest shapes of a family from ``values`` on, as ``nearest``."""
     points, weights = samples
-    size = _start(family, samples)[:, 2:].max(axis=1)
+    values = _start(family, samples)
+    size = values[:, 2:].max(axis=1)
     unit = np.eye(values.shape[1])
 
     def off(values: Floats) -> tuple[Floats, Floats]:
@@ -163,8 +144,8 @@ def _nearest(family: Family, samples: OutlinePoints, values: Floats, rounds: ran
             slopes.append(sum(share[:, None] * slope for share, slope in zip(moved, by_box, strict=True)))
         return here, np.stack(slopes)
 
-    for number in rounds:
-        reach = np.maximum(FIRST_REACH * size / (1 << number), LAST_REACH if number else 0)
+    for number in range(ROUNDS):
+        reach = np.maximum(REACH * size / (1 << number), REACH if number else 0)
         here, slopes = off(values)
         trust = weights / (1 + (here / reach[:, None]) ** 2) ** 2
         weighted = slopes * trust
@@ -173,7 +154,7 @@ def _nearest(family: Family, samples: OutlinePoints, values: Floats, rounds: ran
         damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
         values = values - solve(damped, (weighted * here).sum(axis=2).T[..., None])[..., 0]
         values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
-    return Fits(values, stiffness, off(values)[0])
+    return Fits(values, off(values)[0])
 
 
 def _start(family: Family, samples: OutlinePoints) -> Floats:
@@ -181,10 +162,8 @@ def _start(family: Family, samples: OutlinePoints) -> Floats:
     low, high = samples.points.min(axis=1), samples.points.max(axis=1)
     center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)
     least = half.min(axis=1, keepdims=True)
-    sizes = (
-        np.concatenate([half, 0.5 * least], axis=1) if len(family.values) > 3 else half.mean(1, keepdims=True)
-    )
-    return np.concatenate([center, sizes], axis=1)[:, : len(family.values)]
+    sizes = np.concatenate([half, 0.5 * least], axis=1) if family.count > 3 else half.mean(1, keepdims=True)
+    return np.concatenate([center, sizes], axis=1)[:, : family.count]
 
 
 def shape_of(family: Family, values: Floats, *, is_clockwise: bool) -> Primitive:

@@ -5,18 +5,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
 from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, summed
 from warpsplat.drawing.primitive_fits import (
     FAMILIES,
-    ROUGH_ROUNDS,
-    TOGETHER,
     Family,
     Fits,
     OutlinePoints,
@@ -26,7 +24,7 @@ from warpsplat.drawing.primitive_fits import (
 from warpsplat.drawing.primitive_fits import areas as shape_areas
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.contours import joints_of
-from warpsplat.drawing.trace.curves import Pieces
+from warpsplat.drawing.trace.curves import Pieces, areas_of
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.scene import starts_of
@@ -35,14 +33,8 @@ from warpsplat.svg.primitives import cubics_of as primitive_cubics
 
 Floats = npt.NDArray[np.float64]
 
-MOST_PIECES = 24
-"""Outlines of more pieces are no basic shapes."""
-
 SAMPLES = 96
 """Points by which an outline is compared with a shape."""
-
-FEWER, ROUGHLY = 4, 1.5
-"""One in how many of these tells outlines that are far from any shape, and how much farther those are."""
 
 MOST_OFF = 0.6
 """Largest distance of an outline from its basic shape [px]."""
@@ -56,13 +48,6 @@ BESIDE = 1.5
 SEEN = 1e-3
 """Least squared difference of these colours of an outline that shows: 5 levels in each channel."""
 
-CUBIC_BYTES, LINE_BYTES, LEVEL_BYTES, MOVE_BYTES, NUMBER_BYTES = 19, 7, 4, 6, 3
-"""Bytes of a cubic, a line, a level or upright one, the beginning of a contour, and a number in a file."""
-
-CHECKS = 4
-"""Most renders that confirm replacements: those that cost too much are taken back."""
-
-
 Errors = Callable[[Drawing], Floats]
 """Gives the share of each cell in a drawing's mean squared error, as ``drawing.cells.by_cell``."""
 
@@ -74,19 +59,13 @@ class ShapeCandidate:
     contour: int
     cubics: Floats
     """Cubics of the contour, shape (piece, 4, 2)."""
-    family: Family
-    values: Floats
-    """Shape (value,)."""
-    stiffness: Floats
-    """Error by the square of each value's change, shape (value,)."""
-    is_clockwise: bool
+    made: Primitive
     saved: float
     """Bytes."""
 
-    @cached_property
-    def made(self) -> Primitive:
-        """The shape."""
-        return shape_of(self.family, self.values, is_clockwise=self.is_clockwise)
+    def cells(self) -> Cells:
+        """Return the cells that it changes."""
+        return joined(cells_around(np.concatenate([self.cubics, self.made.cubics()])))
 
 
 def with_shapes(
@@ -107,31 +86,12 @@ def with_shapes(
         worth: Mean squared error that a byte is worth.
         over: Whether there is no time for more.
     """
-    left = with_equal_values(_candidates(target, drawing, worth, over), worth)
-    cells = _cells(left)
-    for _ in range(CHECKS):
-        if not left:
-            break
-        made = _replaced(drawing, left)
-        growth = errors_of(made) - errors
-        taken = [one for one in left if sum_within(growth, cells[one.contour]) <= one.saved * worth]
-        if len(taken) == len(left):
-            return made
-        left = taken
-    return drawing
-
-
-def _cells(candidates: Sequence[ShapeCandidate]) -> dict[int, Cells]:
-    """Return the cells that each candidate changes, by its contour."""
-    found = {}
-    for first in range(0, len(candidates), TOGETHER):
-        chosen = candidates[first : first + TOGETHER]
-        after = primitive_cubics([one.made for one in chosen])
-        cubics = [np.concatenate([one.cubics, own]) for one, own in zip(chosen, after, strict=True)]
-        around = iter(cells_around(np.concatenate(cubics)))
-        for one, own in zip(chosen, cubics, strict=True):
-            found[one.contour] = joined(list(itertools.islice(around, len(own))))
-    return found
+    candidates = _candidates(target, drawing, worth, over)
+    if not candidates:
+        return drawing
+    growth = errors_of(_replaced(drawing, candidates)) - errors
+    taken = [one for one in candidates if sum_within(growth, one.cells()) <= one.saved * worth]
+    return _replaced(drawing, taken) if taken else drawing
 
 
 def _candidates(
@@ -139,8 +99,7 @@ def _candidates(
 ) -> list[ShapeCandidate]:
     """Return the basic shape of each contour that is near to one, the cheapest by error and bytes."""
     scene = drawing.scene
-    pieces = np.diff(scene.starts) // 3
-    contours = np.flatnonzero((pieces >= 2) & (pieces <= MOST_PIECES))
+    contours = np.flatnonzero(np.diff(scene.starts) >= 6)
     if not len(contours):
         return []
     samples, is_likely = _samples(target, _points_along(scene, contours))
@@ -148,7 +107,7 @@ def _candidates(
     contours = contours[is_likely]
     if not len(contours):
         return []
-    areas, sizes = _areas(samples.points), _sizes(drawing)[contours]
+    areas, sizes = areas_of(samples.points).astype(np.float64), _sizes(drawing)[contours]
     found: dict[int, ShapeCandidate] = {}
     least = np.full(len(contours), np.inf)
     for family in FAMILIES:
@@ -156,39 +115,16 @@ def _candidates(
         rows = np.flatnonzero(least >= worth * family.size)
         if not len(rows) or over():
             break
-        rows, begun = _likely(family, rows, samples, worth * (sizes - family.size))
-        if not len(rows):
-            continue
         own = samples.take(rows)
-        fits = nearest(family, own, begun)
+        fits = nearest(family, own)
         costs = _costs(family, fits, own, areas[rows], worth)
         for k in np.flatnonzero(costs < least[rows]).tolist():
             i = int(rows[k])
             contour, saved = int(contours[i]), float(sizes[i]) - family.size
-            values = fits.values[k], fits.stiffness[k]
-            found[i] = ShapeCandidate(
-                contour, cubics_of(scene, contour), family, *values, bool(areas[i] > 0), saved
-            )
+            made = shape_of(family, fits.values[k], is_clockwise=bool(areas[i] > 0))
+            found[i] = ShapeCandidate(contour, cubics_of(scene, contour), made, saved)
         least[rows] = np.minimum(least[rows], costs)
     return [found[i] for i in sorted(found)]
-
-
-def _likely(
-    family: Family, rows: IndexArray, samples: OutlinePoints, most: Floats
-) -> tuple[IndexArray, Floats]:
-    """Return which of the outlines ``rows`` may become shapes of a family, and the values that these have.
-
-    Few samples and rounds tell. ``most``: the errors that the bytes saved are worth, by outline.
-    """
-    few = OutlinePoints(samples.points[rows, ::FEWER], samples.weights[rows, ::FEWER])
-    fits = nearest(family, few, rounds=ROUGH_ROUNDS)
-    off = np.abs(fits.off)
-    cost = FEWER * (few.weights * np.minimum(off, MOST_OFF) ** 2).sum(axis=1)
-    near = ((few.weights > 0) & (off <= ROUGHLY * MOST_OFF)).sum(axis=1) * ROUGHLY >= LEAST_SEEN * off.shape[
-        1
-    ]
-    likely = near & (cost <= ROUGHLY**2 * most[rows])
-    return rows[likely], fits.values[likely]
 
 
 def cubics_of(scene: Scene, contour: int) -> Floats:
@@ -205,32 +141,6 @@ def _points_along(scene: Scene, contours: IndexArray) -> Floats:
     rows = first[..., None] + (3 * piece[..., None] + np.arange(4)) % count[..., None]
     cubics = scene.points[rows].astype(np.float64)
     return np.asarray(points_at(cubics, (place - piece)[..., None])[..., 0, :])
-
-
-def with_equal_values(candidates: list[ShapeCandidate], worth: float) -> list[ShapeCandidate]:
-    """Return candidates with equal sizes and places where they differ by less than a number is worth.
-
-    Values of one kind are merged in pairs, those first that cost least (Ward 1963).
-    """
-    values = [one.values.copy() for one in candidates]
-    saved = [one.saved for one in candidates]
-    for kind in ("x", "y", "side", "radius"):
-        places = [
-            (i, k)
-            for i, one in enumerate(candidates)
-            for k, name in enumerate(one.family.values)
-            if name == kind
-        ]
-        exact = np.array([values[i][k] for i, k in places])
-        stiffness = np.array([candidates[i].stiffness[k] for i, k in places])
-        merged, counts = merge_near(exact, stiffness, NUMBER_BYTES * worth)
-        for (i, k), value, count in zip(places, merged.tolist(), counts.tolist(), strict=True):
-            values[i][k] = value
-            saved[i] += NUMBER_BYTES * (count - 1) / count
-    return [
-        replace(one, values=own, saved=bytes_)
-        for one, own, bytes_ in zip(candidates, values, saved, strict=True)
-    ]
 
 
 def merge_near(values: Floats, stiffness: Floats, price: float) -> tuple[Floats, npt.NDArray[np.int64]]:
@@ -280,19 +190,13 @@ def _samples(target: FloatArray, points: Floats) -> tuple[OutlinePoints, npt.NDA
     return OutlinePoints(points, weights.astype(np.float64)), seen
 
 
-def _areas(points: Floats) -> Floats:
-    """Return the signed areas of polygons (contour, point, 2), those of clockwise ones positive."""
-    x, y = points[..., 0], points[..., 1]
-    return np.asarray((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2)
-
-
 def _sizes(drawing: Drawing) -> Floats:
     """Return about the bytes of each contour."""
     cubics, starts = drawing.cubics(), drawing.scene.starts
     is_level = np.abs(cubics[:, 3] - cubics[:, 0]).min(axis=1) < SAME_COORDINATE
-    size = np.where(drawing.lines(), np.where(is_level, LEVEL_BYTES, LINE_BYTES), CUBIC_BYTES)
+    size = np.where(drawing.lines(), np.where(is_level, prices.LEVEL, prices.LINE), prices.CUBIC)
     owner = np.repeat(np.arange(len(starts) - 1), np.diff(starts) // 3)
-    return MOVE_BYTES + summed(owner, size, len(starts) - 1)
+    return prices.MOVE + summed(owner, size, len(starts) - 1)
 
 
 def _costs(family: Family, fits: Fits, samples: OutlinePoints, areas: Floats, worth: float) -> Floats:

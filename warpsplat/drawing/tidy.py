@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +16,11 @@ from warpsplat.drawing.cells import by_cell
 from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
-from warpsplat.drawing.nodes import Outlines, apart, applied
+from warpsplat.drawing.nodes import apart, applied, candidates
+from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.shapes import with_shapes
 from warpsplat.fit.problem import Run
-from warpsplat.fit.rounding import byte_worth
 from warpsplat.metrics import decibels
-from warpsplat.portable import elementary
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.renderer import render
 from warpsplat.rendering.tiles import to_tiles
@@ -28,9 +28,6 @@ from warpsplat.scene import FloatArray
 from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.sizes import estimated_size
 from warpsplat.svg.write import GRIDS, rounded
-
-ROUNDS = 16
-"""Most rounds in which edits are tried."""
 
 FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
@@ -41,27 +38,15 @@ FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
 FIRST_FAR, SECOND_FAR = 4, 3
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
 
-LEAST_ERROR = 3e-5
-"""Mean squared error below which differences do not count: 45 dB. A drawing can reach much less, by nodes
-that nobody would miss."""
-
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
-MEASURED_GRIDS = 3.0, 8.0, 20.0, 50.0
-"""View box units per pixel at which files are measured; between and beyond, bytes grow as the digits do."""
-
-LASTING = 0.7
-"""Share of the error by rounding that is left once the handles have been refitted, measured."""
-
-WORTHWHILE = 0.004
-"""Least share of the file's bytes that a round saves for another one to follow."""
-
 RECOVERED = 10.0
-"""Largest error of an edit before refitting, over the largest one after: refitting recovers most of it."""
+"""Largest error of an edit before refitting, over the largest one after: refitting recovers most of it, and
+of a larger one samples cannot tell."""
 
-FIRST_END, SECOND_END = 0.5, 0.8
-"""Shares of the progress at which the first two fits are done."""
+Worth = Callable[[float, float], float]
+"""Gives what a byte is worth at an error and a size, as ``prices.worth``."""
 
 
 class Finished(NamedTuple):
@@ -104,27 +89,29 @@ def finish_drawing(
     target = matching(target, drawing.scene.canvas)
     if run.over() or not len(drawing.scene):
         return Finished(drawing, grid or min(DRAFT_GRID, finest))
+    byte = partial(worth, price=price, negligible=negligible)
+    parts = [run.part(i / 3, (i + 1) / 3) for i in range(3)]
     fit = OutlineFit(target, drawing, run)
-    fit.advance(run.part(0.0, FIRST_END), FIRST_STEPS, FIRST_FAR)
+    fit.advance(parts[0], FIRST_STEPS, FIRST_FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, price, negligible, run.over), run, fit.capacity)
-        fit.advance(run.part(FIRST_END, SECOND_END), SECOND_STEPS, SECOND_FAR)
+        fit = OutlineFit(target, tidied(fit, byte, run.over), run, fit.capacity)
+        fit.advance(parts[1], SECOND_STEPS, SECOND_FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
     equal: list[Equal] = []
     if tidy and not run.over():
         fitted = fit.drawing
-        exact, equal = with_exact_shapes(target, fitted, run, price, negligible, symbols=symbols)
+        exact, equal = with_exact_shapes(target, fitted, run, byte, symbols=symbols)
         if exact is not fitted:
             fit = OutlineFit(target, exact, run, fit.capacity)
     if run.over():
         return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
-    grid = grid or drawing_grid(fit, finest, price, negligible)
+    grid = grid or drawing_grid(fit, finest, byte)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
     held[::3] = True
     fit.hold(np.where(held[:, None], low.points, fit.points), held)
-    fit.advance(run.part(SECOND_END, 1.0), THIRD_STEPS)
+    fit.advance(parts[2], THIRD_STEPS)
     drawing = fit.drawing
     low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
     return Finished(replace(drawing, scene=low), grid, decibels(fit.error * 255**2))
@@ -139,7 +126,7 @@ def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int, negligible:
 
 
 def with_exact_shapes(
-    target: FloatArray, drawing: Drawing, run: Run, price: float, negligible: float, *, symbols: bool
+    target: FloatArray, drawing: Drawing, run: Run, byte_of: Worth, *, symbols: bool
 ) -> tuple[Drawing, list[Equal]]:
     """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
 
@@ -156,65 +143,55 @@ def with_exact_shapes(
         return fit.drawing
 
     errors = errors_of(drawing)
-    size = estimated_size(drawing.scene, DRAFT_GRID)
-    worth = price * byte_worth(max(float(errors.sum()), negligible), size)
-    exact = with_shapes(target, drawing, errors_of, errors, worth, run.over)
+    byte = byte_of(float(errors.sum()), estimated_size(drawing.scene, DRAFT_GRID))
+    exact = with_shapes(target, drawing, errors_of, errors, byte, run.over)
     if not symbols:
         return exact, []
-    return with_equal_outlines(exact, errors_of, errors_of(exact), worth, refit)
+    return with_equal_outlines(exact, errors_of, errors_of(exact), byte, refit)
 
 
-def tidied(
-    fit: OutlineFit,
-    price: float = 1.0,
-    negligible: float = LEAST_ERROR,
-    over: Callable[[], bool] = bool,
-) -> Drawing:
-    """Return a drawing without the nodes, curves and slants that are worth less than their bytes.
+def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = bool) -> Drawing:
+    """Return a drawing without the nodes and curves that are worth less than their bytes.
 
     In each round edits that do not overlap are made together and the outlines fitted to where the image says
     that they are; each edit is judged by what is left around it, and if some cost too much, the others are
-    made without them. ``price`` and ``negligible``: see ``finish_drawing``.
+    made without them. ``byte_of``: what a byte is worth at an error and a size.
     """
     drawing, least = fit.drawing, fit.least
     samples = fit.places()
     errors = model.errors(samples, drawing.cubics())
     rest = fit.error - errors.sum()
-    size = first = estimated_size(drawing.scene, DRAFT_GRID)
-    refused = np.zeros((len(errors), 4), np.bool_)
-    for _ in range(ROUNDS):
-        edits = Outlines(drawing).edits(refused)
-        worth = price * byte_worth(max(rest + float(errors.sum()), negligible), size)
+    size = float(estimated_size(drawing.scene, DRAFT_GRID))
+    refused = np.zeros((len(errors), 2), np.bool_)
+    while not over():
+        edits = candidates(drawing, refused)
+        byte = byte_of(rest + float(errors.sum()), size)
         growth = model.before_fit(samples, drawing, edits)
-        cheap = growth <= RECOVERED * edits.saved * worth
+        cheap = growth <= RECOVERED * edits.saved * byte
         edits, growth = edits.take(cheap), growth[cheap]
         left = edits.take(apart(edits, growth / edits.saved))
         contour, count = drawing.contour(), len(drawing.scene.starts) - 1
-        stale, fit_before = touched(contour[left.at], count), None
         # Outlines without candidates, or whose candidates are all refused, stay as they are.
-        refused[~stale[contour]] = True
+        refused[~touched(contour[left.at], count)[contour]] = True
         while len(left.at):
             if over():
                 return drawing
             edited, keep = applied(drawing, left)
             moved = model.carried(samples, drawing, left, keep)
-            if fit_before:
-                moved, edited = model.known(moved, edited, fit_before, ~stale)
-            edited, moved, after = model.fitted(moved, edited, least, stale)
+            edited, moved, after = model.fitted(moved, edited, least, touched(contour[left.at], count))
             every = np.zeros(len(keep))
             every[keep] = after
             change = every - errors
             around = np.sort(left.around, axis=1)
             fresh = np.concatenate([np.ones((len(around), 1), np.bool_), np.diff(around, axis=1) > 0], axis=1)
-            taken = (change[around] * fresh).sum(axis=1) <= left.saved * worth
+            taken = (change[around] * fresh).sum(axis=1) <= left.saved * byte
             refused[left.at[~taken], left.kind[~taken]] = True
             if taken.all():
                 drawing, samples, errors, refused = edited, moved, after, refused[keep]
                 break
-            stale, fit_before = touched(contour[left.at[~taken]], count), (moved, edited)
             left = left.take(taken)
-        size -= int(left.saved.sum())
-        if left.saved.sum() < WORTHWHILE * first or over():
+        size -= float(left.saved.sum())
+        if not len(left.at):
             break
     return drawing
 
@@ -224,21 +201,14 @@ def touched(contours: Links, count: int) -> Flags:
     return np.bincount(contours, minlength=count) > 0
 
 
-def drawing_grid(
-    fit: OutlineFit, finest: float, price: float = 1.0, negligible: float = LEAST_ERROR
-) -> float:
+def drawing_grid(fit: OutlineFit, finest: float, byte_of: Worth) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
     before = model.errors(samples, fit.drawing.cubics()).sum()
-    sizes = [estimated_size(scene, grid) for grid in MEASURED_GRIDS]
-    digits = [elementary.log2(grid) for grid in MEASURED_GRIDS]
-    worth = price * byte_worth(max(fit.error, negligible), sizes[1])
+    byte = byte_of(fit.error, estimated_size(scene, DRAFT_GRID))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
         loss = float(model.errors(samples, low.cubics()).sum() - before)
-        k = min(sum(grid >= g for g in MEASURED_GRIDS[1:]), len(sizes) - 2)
-        slope = (sizes[k + 1] - sizes[k]) / (digits[k + 1] - digits[k])
-        size = sizes[k] + slope * (elementary.log2(grid) - digits[k])
-        costs[grid] = LASTING * loss + worth * size
+        costs[grid] = loss + byte * estimated_size(scene, grid)
     return min(costs, key=costs.__getitem__)

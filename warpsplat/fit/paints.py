@@ -14,12 +14,10 @@ from warpsplat.fit.rounding import USUAL_GRID, byte_worth, finest
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import GRADIENTS, FloatArray, Paint, Scene, Spread
 from warpsplat.scene.scene import IntArray, starts_of
+from warpsplat.svg.sizes import GRADIENT
 
 if TYPE_CHECKING:
     from warpsplat.fit.step import Step
-
-GRADIENT_BYTES = 185
-"""Bytes of a gradient of two stops in a file, with the reference to it."""
 
 GAIN_TO_TRY, GAIN_TO_KEEP = 1.0, 4.0
 """Minimum gain of a ramp over the worth of its bytes: while shapes are still added, and while the surplus is
@@ -43,7 +41,7 @@ def choose_paints(step: Step) -> None:
     min_gain = 0.0
     if settings.painting == "auto":
         size = len(export(scene, settings, min(USUAL_GRID, finest(settings))))
-        min_gain = GRADIENT_BYTES * byte_worth(step.objective.value(), size)
+        min_gain = GRADIENT * byte_worth(step.objective.value(), size)
     surplus = state.step > settings.density.thin * settings.iterations
     min_gain *= GAIN_TO_KEEP if surplus else GAIN_TO_TRY
     kind, ramps = _best_ramps(settings, solver, min_gain)

@@ -142,7 +142,7 @@ def freeze_stage(step: Step, stage: int) -> None:
     parameters.hold("widths", np.ones(len(scene), np.bool_))
 
 
-def byte_worth(loss: float, size: int) -> float:
+def byte_worth(loss: float, size: float) -> float:
     """Return by how much the loss may grow for each byte saved of a file with ``size`` bytes.
 
     Shapes bought with that byte would lower the error as much: -d error / d size at ``DB_PER_DOUBLING``.

@@ -25,6 +25,7 @@ from warpsplat.run.figures import level_scores, missed_goals, render_score, scor
 from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
+from warpsplat.run.second_look import other_subject, retaken
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
@@ -136,6 +137,12 @@ def make_result(
     with naming(image.name):
         if start is None:
             made = _made(problem, strategy, part)
+            while image.why and (other := other_subject(made, problem)):
+                image = retaken(image, other)
+                problem, settings = image.problem, image.problem.settings
+                strategy = choose_strategy(settings)
+                part = run if strategy.traces else before_clearing(run, target)
+                made = _made(problem, strategy, part)
         else:
             from warpsplat.fit.loop import fit
 

@@ -16,6 +16,9 @@ Floats = npt.NDArray[np.float64]
 HEAD, PATH, MOVE = 130, 32, 1
 """Characters of the file's beginning and end, of a path but for its data, and of a move's letter."""
 
+USE, GRADIENT = 34, 185
+"""Bytes of a ``use`` element, and of a gradient of two stops with the reference to it."""
+
 BASIC = 24
 """Characters of a circle, or an outline of arcs, over those of a path."""
 

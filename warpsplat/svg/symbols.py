@@ -12,9 +12,7 @@ from warpsplat.scene import Basis, IndexArray, Kind, Paint, Scene
 from warpsplat.svg.data import path_data, units
 from warpsplat.svg.paints import unused
 from warpsplat.svg.parts import with_parts
-
-USE_BYTES = 34
-"""Bytes of a ``use`` element."""
+from warpsplat.svg.sizes import USE
 
 DEFINITION_BYTES = 21
 """Bytes around the path data of a definition."""
@@ -80,7 +78,7 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
             continue
         first = rows_of(scene, parts[0])
         data = _data_of(scene, parts[0], grid[first[0]] / units(scene, per_pixel)[first[0]], per_pixel)
-        if len(parts) * (len(data) - USE_BYTES) <= len(data) + DEFINITION_BYTES:
+        if len(parts) * (len(data) - USE) <= len(data) + DEFINITION_BYTES:
             continue
         name = f"{prefix}{len(definitions)}"
         definitions.append(f'<path id="{name}" d="{data}"/>')

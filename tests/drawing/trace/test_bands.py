@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from warpsplat.drawing.trace.bands import split_uneven
+from warpsplat.drawing.trace.palette import paint_parts
 from warpsplat.drawing.trace.ramps import fit_ramp
 from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.drawing.trace.trace import trace
@@ -86,3 +88,14 @@ def test_stops_of_a_gradient_are_pixels_apart() -> None:
     ramp = fit_ramp(np.repeat(tones[..., None], 4, axis=2).astype(np.float32), np.ones((12, 60), bool), 0, 0)
     assert ramp is not None
     assert np.diff(ramp.offsets).min() * np.hypot(*ramp.frame[2:4]) >= 0.99
+
+
+def test_flat_parts_stay_whole() -> None:
+    image = np.full((32, 32, 4), 255, np.float32)
+    image[8:24, 8:24, :3] = 90
+    labels = (image[..., 0] < 200).astype(np.int32)
+    parts = paint_parts(image, labels, 0.0)
+    assert split_uneven(image, parts, 0.0) is parts
+    waves = 8 * np.sin(np.arange(32) / 2)
+    image[..., :3] += np.outer(waves, waves)[..., None] * (labels == 1)[..., None]
+    assert len(split_uneven(image, paint_parts(image, labels, 0.0), 0.0).paint) > 2

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, shown, traced
+from warpsplat.drawing.line_art import with_equal_widths
 from warpsplat.drawing.strokes.centerlines import CenterLine, find_lines
+from warpsplat.drawing.strokes.chains import END, Arm, joined_arms
 from warpsplat.drawing.strokes.ink import find_ink
 from warpsplat.drawing.strokes.lines import rejoined
 from warpsplat.drawing.strokes.pens import find_pens, width_steps
@@ -128,3 +130,46 @@ def test_ends_that_met_stay_where_they_met() -> None:
 
 def test_no_ink_no_strokes() -> None:
     assert len(traced(np.ones((40, 50, 3), np.float32))) == 0
+
+
+LOOP = '<path d="M8 60C40 70 80 40 60 16C48 2 30 16 44 36C56 54 80 60 90 40"/>'
+SHARP = '<path d="M34 8L28 64M64 8L58 64M12 24H84M10 46H82"/>'
+NET = "".join(f'<path d="M{10 + 9 * i} 64L{26 + 9 * i} 8M8 {14 + 10 * i}H88"/>' for i in range(5))
+
+
+@pytest.mark.parametrize(
+    ("paths", "count"),
+    [
+        (CROSS, 2),
+        ('<path d="M6 30L90 42M6 42L90 30"/>', 2),
+        (SHARP, 4),
+        ('<circle cx="48" cy="36" r="22"/><path d="M10 50L86 20"/>', 2),
+        ('<path d="M70 12H26V60H70M26 35H60" stroke-width="5" stroke-linejoin="round"/>', 2),
+        (LOOP, 1),
+        (NET.replace("<path", '<path stroke-width="1.5"'), 10),
+    ],
+)
+@pytest.mark.parametrize("is_grey", [True, False])
+def test_each_drawn_line_is_one_stroke(paths: str, count: int, is_grey: bool) -> None:
+    image = drawn(paths)
+    scene = traced(image if is_grey else np.round(image))
+    assert len(scene) == count
+    if is_grey:
+        assert np.ptp(scene.widths) < 0.4
+
+
+def test_strokes_about_as_wide_have_one_width() -> None:
+    points = np.array([[[8, y], [20, y], [35, y], [80, y]] for y in (10, 20, 30, 40)], np.float32)
+    strokes = Scene.uniform(Kind.STROKE, Canvas(96, 72, None), points)
+    strokes = replace(strokes, widths=np.array([3, 3.1, 2.9, 5], np.float32))
+    assert with_equal_widths(strokes).widths == pytest.approx([3, 3, 3, 5], abs=1e-3)
+
+
+def test_arms_are_joined_by_the_least_bending_of_all() -> None:
+    turns = np.radians([0, 90, 180, 200])
+    ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    arms = [Arm(5 * way, way) for way in ways]
+    pairs, cost = joined_arms(arms, [0] * 4)
+    assert sorted(pairs) == [(0, 2), (1, 3)]
+    assert cost == pytest.approx(np.radians(70) ** 2)
+    assert joined_arms(arms, [0, 1, 2, 3]) == ([], 4 * END)

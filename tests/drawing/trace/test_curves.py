@@ -7,8 +7,7 @@ import pytest
 
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.corners import find_corners
-from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.ellipses import fit_ellipses
+from warpsplat.drawing.trace.curves import Pieces, areas_of, fit_circles, fit_polylines
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.spans import Polyline
@@ -59,23 +58,12 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
     assert (np.abs(ends) < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
 
 
-def test_an_ellipse_is_four_cubics_the_way_round_that_it_was() -> None:
-    points = ring(30, squeeze=0.5, turn=0.4)
-    for way in (points, points[::-1]):
-        is_ellipse, cubics = fit_ellipses([way], 0.2)
-        assert is_ellipse.all()
-        shown = sampled(cubics[0])
-        nearest = np.hypot(*(shown[:, None] - points[None]).transpose(2, 0, 1)).min(axis=1)
-        assert nearest.max() < 0.5  # half of the points' distance
-        area = np.sum(shown[:-1, 0] * shown[1:, 1] - shown[1:, 0] * shown[:-1, 1])
-        wanted = np.sum(way[:-1, 0] * way[1:, 1] - way[1:, 0] * way[:-1, 1])
-        assert np.sign(area) == np.sign(wanted)
-
-
-def test_a_square_is_no_ellipse() -> None:
+def test_circles_keep_their_way_round_and_squares_and_ellipses_are_none() -> None:
     square = polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float))
-    is_ellipse, cubics = fit_ellipses([square, ring(20), square[:4]], 0.2)
-    assert is_ellipse.tolist() == [False, True, False] and len(cubics) == 1
+    found = fit_circles([square, ring(20), ring(20)[::-1], ring(20, squeeze=0.9), square[:4]], 0.2)
+    assert sorted(found) == [1, 2]
+    one, other = areas_of(np.stack([sampled(found[number]) for number in (1, 2)]))
+    assert one > 1250 and abs(one + other) < 1e-6
 
 
 def test_a_polygon_is_lines_between_its_corners() -> None:

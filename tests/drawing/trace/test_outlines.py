@@ -9,6 +9,7 @@ from tests.drawing.trace.drawings import draw, draw_exactly, ground, levels
 from warpsplat.drawing.trace.grids import NO_REGION, components
 from warpsplat.drawing.trace.order import find_tree
 from warpsplat.drawing.trace.outlines import find_boundary
+from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.planar import STEPS, Loops, find_loops
 from warpsplat.drawing.trace.regions import find_regions
 
@@ -89,12 +90,13 @@ def test_straight_edges_are_exact(slope: float) -> None:
     low, high = (48.3 + slope * (x - 48) for x in (-200, 296))
     body = ground("#102030") + f'<path d="M-200 {low}L296 {high}V900H-200Z" fill="#f0c090"/>'
     image = levels(draw_exactly(body))
-    found = find_regions(image)
+    found = find_partition(find_regions(image))
     assert len(found.paint) == 2
-    loops = find_loops(found.labels, image)
+    loops = find_loops(found.labels, found.fills)
     boundary = find_boundary(loops, found)
-    inner = boundary.is_good & (loops.others != NO_REGION) & (np.abs(loops.vertices - 48) < 40).all(axis=1)
-    x, y = boundary.points[inner].T
+    points = boundary.points / found.scale
+    inner = boundary.is_good & (loops.others != NO_REGION) & (np.abs(points - 48) < 40).all(axis=1)
+    x, y = points[inner].T
     off = (y - 48.3 - slope * (x - 48)) / np.hypot(1, slope)
     assert len(off) > 50
     assert np.abs(off).max() < 0.06
@@ -105,6 +107,10 @@ def test_cracks_without_antialiasing_stay() -> None:
     image = levels(
         draw(ground("#fff") + '<rect x="10" y="20" width="30" height="9" fill="#123"/>', hard=True)
     )
-    found = find_regions(image)
-    loops = find_loops(found.labels, image)
-    assert not find_boundary(loops, found).offsets.any()
+    found = find_partition(find_regions(image))
+    loops = find_loops(found.labels, found.fills)
+    inner = (loops.others != NO_REGION) & (loops.vertices > 0).all(axis=1)
+    inner &= (loops.vertices < 96 * found.scale).all(axis=1)
+    x, y = (find_boundary(loops, found).points / found.scale)[inner].T
+    off = np.minimum(np.abs(x[:, None] - [10, 40]).min(axis=1), np.abs(y[:, None] - [20, 29]).min(axis=1))
+    assert inner.any() and not off.any()

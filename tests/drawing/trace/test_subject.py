@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
+
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
 from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.files.sources import image_of
 from warpsplat.scene import FloatArray
 
 LINES = ground("#fff") + (
@@ -125,6 +129,45 @@ def screen_tones() -> FloatArray:
     return image
 
 
+def page(side: int = 160) -> FloatArray:
+    """Lines of strokes of 12 px on a pale ground."""
+    strokes = "".join(
+        f"M{6 + 6 * i} {6 + 18 * j}v{10 - 2 * (i % 4)}h{2 + (i + j) % 3}" for i in range(24) for j in range(8)
+    )
+    return draw(
+        ground("#fbfbf8", side, side) + f'<path d="{strokes}" fill="none" stroke="#223" stroke-width="1.6"/>',
+        side,
+        side,
+    )
+
+
+def on_checkerboard() -> FloatArray:
+    """Bright discs, half covered by a dark checkerboard: dark and light are cells, colours are not."""
+    colors, places = ("#ff2", "#2ff", "#f5f", "#fff"), range(3, 126, 17)
+    discs = "".join(
+        f'<circle cx="{x + y % 5}" cy="{y}" r="11" fill="{colors[(x + y) % 4]}"/>'
+        for x in places
+        for y in places
+    )
+    dark = np.kron(np.indices((16, 16)).sum(axis=0) % 2, np.ones((8, 8)))[..., None]
+    return (0.35 * dark + draw(ground("#fff", 128, 128) + discs, 128, 128) * (1 - dark)).astype(np.float32)
+
+
+def cut_out() -> FloatArray:
+    """A photograph in a disc on white."""
+    inside = np.hypot(*(np.mgrid[:192, :192] - 95.5)) < 60
+    detail = cv2.GaussianBlur(
+        np.random.default_rng(1).normal(0, 1, (192, 192, 3)).astype(np.float32), (0, 0), 2
+    )
+    return np.where(inside[..., None], np.clip(photograph(192) + detail, 0, 1), 1).astype(np.float32)
+
+
+def jpeg(image: FloatArray, quality: int) -> FloatArray:
+    data = io.BytesIO()
+    Image.fromarray(np.round(255 * image).astype(np.uint8)).save(data, "JPEG", quality=quality)
+    return image_of(data.getvalue())
+
+
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -147,6 +190,20 @@ PICTURES = {
     "shaded sprite": (sprite(), "pixel"),
     "table": (table(), "drawing"),
     "words beside a photograph": (words_on_shade(), "drawing"),
+    "page with noise": (grainy(page(), 4), "drawing"),
+    "icon with noise": (grainy(icon(32), 4), "drawing"),
+    "logo with noise": (grainy(draw(ground("#fff") + LOGO), 4), "drawing"),
+    "page as JPEG": (jpeg(page(), 75), "drawing"),
+    "icon as JPEG": (jpeg(icon(32), 75), "drawing"),
+    "small logo as JPEG": (jpeg(draw(ground("#fff") + LOGO), 75), "drawing"),
+    "on a checkerboard": (on_checkerboard(), "drawing"),
+    "cut out": (cut_out(), "photo"),
+    "cells of many colours": (cells(20, 4, 90), "pixel"),
+    "shaded sky with grain": (
+        grainy(np.linspace(0.3, 0.9, 96)[:, None, None] * np.ones((96, 96, 3)), 4),
+        "photo",
+    ),
+    "even shading": (np.linspace(0.3, 0.9, 96)[:, None, None] * np.ones((96, 96, 3), np.float32), "drawing"),
 }
 
 

@@ -8,8 +8,9 @@ import pytest
 from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
 from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.trace import Traced, trace, trace_regions
+from warpsplat.drawing.trace.trace import Traced, trace, trace_partition
 from warpsplat.metrics import psnr
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Paint
@@ -39,7 +40,6 @@ def test_a_logo() -> None:
     star = hex_colors(traced).index("ffd23f")
     kinds = traced.joints[traced.scene.first[star] : traced.scene.first[star + 1]]
     assert (kinds == Joint.CORNER).sum() == 10
-    assert (kinds == Joint.LINE_HANDLE).sum() == 20
     disc = hex_colors(traced).index("ee4266")
     assert traced.scene.point_counts()[disc] == 12
     assert on_outline(traced).sum() * 3 == len(traced.scene.points)
@@ -167,7 +167,7 @@ def test_regions_of_single_pixels_are_traced() -> None:
     paint[labels] = painted
     regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
     with np.errstate(all="raise"):
-        traced = trace_regions(regions)
+        traced = trace_partition(find_partition(regions))
     assert np.isfinite(traced.scene.points).all()
 
 
@@ -180,7 +180,7 @@ def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
     regions = Regions(
         image, painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0
     )
-    scene = trace_regions(regions).scene
+    scene = trace_partition(find_partition(regions)).scene
     assert scene.canvas.background is not None
     assert len(scene) == 1
 

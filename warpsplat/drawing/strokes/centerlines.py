@@ -17,6 +17,7 @@ from warpsplat.drawing.strokes.areas import (
 )
 from warpsplat.drawing.strokes.blobs import BROAD, hollowed, pen_width
 from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced
+from warpsplat.drawing.strokes.crossings import with_crossings
 from warpsplat.drawing.strokes.dots import Dot, bare_dots, round_dots
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.strokes.measure import measured
@@ -93,6 +94,7 @@ def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> St
     split = _Split(ink) if only_lines else _split(ink, mixed=mixed)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     graph, radii = find_graph(split.thin.mask if fine == 1 else _enlarged(split.thin, fine))
+    graph = with_crossings(graph)
     if len(graph.edges) > MOST:
         longest = np.argsort([-edge.length() for edge in graph.edges], kind="stable")[:MOST]
         graph = Graph([graph.edges[i] for i in np.sort(longest)], graph.places, graph.radii)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+from functools import cache
+from typing import NamedTuple
+
 import numpy as np
 
 from warpsplat.drawing.strokes.skeleton import Edge, Graph
 from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.drawing.trace.polylines import arc_lengths
-from warpsplat.portable.elementary import exp, hypot
+from warpsplat.portable.elementary import arctan2, exp, hypot
 from warpsplat.portable.sequences import convolve, interp
 
-STRAIGHT = 0.6427876  # cosine of the turn up to which a line goes on through a junction: 50 degrees
+END = 2.0  # [rad²] what an end of a stroke costs, as the bending of a line that goes on instead
+MOST_ARMS = 10  # of a junction whose lines are joined by the least bending of all; of larger ones one by one
 
 End = tuple[int, int]
 """An edge's number, and 0 where it begins or 1 where it ends."""
@@ -19,6 +25,18 @@ REACH = 4.0  # length of line that tells in which direction it leaves a junction
 BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
 FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
 SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
+
+
+class Arm(NamedTuple):
+    """A line where it leaves a junction, beyond what the other lines bend."""
+
+    place: Floats
+    """Shape (2,)."""
+    direction: Floats
+    """Unit vector away from the junction, shape (2,)."""
+
+
+Pairs = list[tuple[int, int]]
 
 
 def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
@@ -47,42 +65,87 @@ def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
 
 
 def _continued(graph: Graph, pens: Ints) -> dict[End, End]:
-    """Return the end of an edge at which each end of an edge goes straight on."""
+    """Return the end of an edge at which each end of an edge goes on."""
     found: dict[End, End] = {}
-    for node, numbers in enumerate(graph.at):
-        if len(numbers) < 2:
+    for node in range(len(graph.at)):
+        ends = ends_at(graph, node)
+        if len(ends) < 2 or (len(ends) == 2 and ends[0][0] == ends[1][0]):
             continue
-        ends = [(n, e) for n in sorted(set(numbers)) for e in (0, 1) if graph.edges[n].nodes[e] == node]
-        if len(ends) == 2 and ends[0][0] == ends[1][0]:
-            continue
-        directions = [_heading(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
-        bends = sorted(
-            (-_straightness(directions[i], directions[j]), i, j)
-            for i in range(len(ends))
-            for j in range(i)
-            if pens[ends[i][0]] == pens[ends[j][0]]
-        )
-        for bend, i, j in bends:
-            if -bend >= STRAIGHT and ends[i] not in found and ends[j] not in found:
-                found[ends[i]], found[ends[j]] = ends[j], ends[i]
+        arms = [arm_of(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
+        for i, j in joined_arms(arms, [int(pens[n]) for n, _ in ends])[0]:
+            found[ends[i]], found[ends[j]] = ends[j], ends[i]
     return found
 
 
-def _heading(edge: Edge, end: int, radius: float) -> Floats:
-    """Return the unit vector in which an edge leaves its node, beyond what the junction bends."""
+def ends_at(graph: Graph, node: int) -> list[End]:
+    """Return the ends of edges at a node."""
+    return [(n, e) for n in sorted(set(graph.at[node])) for e in (0, 1) if graph.edges[n].nodes[e] == node]
+
+
+def arm_of(edge: Edge, end: int, radius: float) -> Arm:
+    """Return an edge where it leaves a junction of a ``radius``."""
     points = edge.points if end == 0 else edge.points[::-1]
     along = arc_lengths(points)
-    low, high = BENT * radius, REACH * max(radius, 1.5)
+    low, high = BENT * radius, BENT * radius + REACH * max(min(radius, edge.half_width), 1.5)
     if along[-1] < high:
-        low, high = 0.3 * along[-1], along[-1]
+        low, high = min(low, 0.3 * along[-1]), along[-1]
     near = points[np.searchsorted(along, low) : np.searchsorted(along, high) + 1]
-    direction = near[-1] - near[0] if len(near) > 1 else points[-1] - points[0]
-    return np.asarray(direction / max(float(hypot(*direction)), 1e-9))
+    near = near if len(near) > 1 else points[[0, -1]]
+    direction = near[-1] - near[0]
+    return Arm(near[0], direction / max(float(hypot(*direction)), 1e-9))
 
 
-def _straightness(one: Floats, other: Floats) -> float:
-    """Return the cosine of the turn of a line that comes against one unit vector and leaves along another."""
-    return min(-float((one * other).sum()), 1.0)
+def bending(one: Arm, other: Arm) -> float:
+    """Return how much a line bends that comes along one arm and leaves along another [rad²].
+
+    It is the bending energy of a flat cubic between both, times its length: the square of its turn on an arc.
+    """
+    chord = other.place - one.place
+    if hypot(*chord) < 1:
+        chord = other.direction - one.direction
+    before, after = _turn(-one.direction, chord), _turn(chord, other.direction)
+    return 4 * (before * before - before * after + after * after)
+
+
+def _turn(one: Floats, other: Floats) -> float:
+    """Return the angle from one vector to another [rad]."""
+    return float(arctan2(one[0] * other[1] - one[1] * other[0], (one * other).sum()))
+
+
+def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
+    """Return which arms of a junction are one line, by the least bending and ends, and what these cost.
+
+    ``kinds``: arms of different kinds are not joined.
+    """
+    costs = {
+        (i, j): bending(arms[i], arms[j])
+        for i, j in itertools.combinations(range(len(arms)), 2)
+        if kinds[i] == kinds[j]
+    }
+
+    @cache
+    def best(left: tuple[int, ...]) -> tuple[float, Pairs]:
+        if not left:
+            return 0.0, []
+        first, rest = left[0], left[1:]
+        cost, pairs = best(rest)
+        found = (cost + END, pairs)
+        for j in rest:
+            if costs.get((first, j), math.inf) < 2 * END:
+                cost, pairs = best(tuple(k for k in rest if k != j))
+                found = min(found, (cost + costs[first, j], [(first, j), *pairs]))
+        return found
+
+    left = tuple(range(len(arms)))
+    early: Pairs = []
+    while len(left) > MOST_ARMS:
+        cost, pair = min((costs.get(pair, math.inf), pair) for pair in itertools.combinations(left, 2))
+        if cost >= 2 * END:
+            return early, END * len(left)
+        early.append(pair)
+        left = tuple(k for k in left if k not in pair)
+    cost, pairs = best(left)
+    return early + pairs, cost + sum(costs[pair] for pair in early)
 
 
 def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floats, bool] | None:
@@ -125,7 +188,7 @@ def _is_smooth_ring(graph: Graph, edges: list[Edge]) -> bool:
     if len(graph.at[node]) <= 2:
         return True
     radius = float(graph.radii[node])
-    return _straightness(_heading(edges[0], 0, radius), _heading(edges[-1], 1, radius)) >= STRAIGHT
+    return bending(arm_of(edges[0], 0, radius), arm_of(edges[-1], 1, radius)) < 2 * END
 
 
 def _unbent(graph: Graph, edge: Edge) -> Floats:

@@ -6,7 +6,6 @@ import numpy as np
 
 from warpsplat.drawing.strokes.ink import Ink
 from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
-from warpsplat.portable.elementary import exp, log
 from warpsplat.portable.filters import lab
 from warpsplat.scene import FloatArray
 
@@ -15,8 +14,10 @@ LEAST_COVER = 0.1  # cover from which on its colour can be told
 ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
 SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
 MOST = 8  # pens
-STEP = 0.12  # deviation of the logarithm of a line's width from which on it is drawn in steps
-SHORTEST = 3.0  # length of a step, over the line's width, at the least
+STEP, STEP_PX = 0.3, 1.0
+"""Difference of a line's widths up to which it is drawn with one, over their mean; and [px]."""
+
+SHORTEST = 4.0  # length of a part with a width of its own, over that width, at the least
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -91,31 +92,29 @@ def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
 
 
 def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:
-    """Split a line into parts that have one width each: first point, last point, width.
+    """Split a line where its pen's width changes: first point, last point, width of each part.
 
     Args:
         widths: At the points of a line [px], shape (point,).
         spacing: Of the points [px].
     """
-    logs = log(np.maximum(widths, 0.25))
-    sums = np.concatenate([[0.0], np.cumsum(logs)])
-    squares = np.concatenate([[0.0], np.cumsum(logs**2)])
-
-    def error(low: Ints, high: Ints) -> Floats:
-        """Return the squared deviations of the points from ``low`` to before ``high``."""
-        total = sums[high] - sums[low]
-        return np.asarray(squares[high] - squares[low] - total * total / np.maximum(high - low, 1))
+    sums = np.concatenate([[0.0], np.cumsum(widths)])
 
     def parts(low: int, high: int) -> list[tuple[int, int]]:
-        whole = float(error(np.array(low), np.array(high)))
-        least = max(2, round(SHORTEST * float(exp(logs[low:high].mean())) / max(spacing, 1e-6)))
+        total = sums[high] - sums[low]
+        least = max(2, round(SHORTEST * float(total) / (high - low) / max(spacing, 1e-6)))
         cuts = np.arange(low + least, high - least + 1)
-        if whole <= STEP * STEP * (high - low) or not len(cuts):
-            return [(low, high)]
-        cut = int(cuts[(error(np.array(low), cuts) + error(cuts, np.array(high))).argmin()])
-        return [*parts(low, cut), *parts(cut, high)]
+        if len(cuts):
+            before, after = sums[cuts] - sums[low], sums[high] - sums[cuts]
+            # The cut of the least squared deviations.
+            best = (before * before / (cuts - low) + after * after / (high - cuts)).argmax()
+            cut = int(cuts[best])
+            widths_of_parts = np.median(widths[low:cut]), np.median(widths[cut:high])
+            if abs(np.subtract(*widths_of_parts)) > max(STEP_PX, STEP * np.mean(widths_of_parts)):
+                return [*parts(low, cut), *parts(cut, high)]
+        return [(low, high)]
 
     return [
-        (low, min(high, len(widths) - 1), float(exp(np.median(logs[low:high]))))
+        (low, min(high, len(widths) - 1), float(np.median(widths[low:high])))
         for low, high in parts(0, len(widths))
     ]

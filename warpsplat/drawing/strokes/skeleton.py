@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, at_pixels, depth
 from warpsplat.portable.elementary import hypot
 
 STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 """Rows and columns to the neighbours of a pixel, the straight ones first."""
 
-SPUR = (
-    1.5  # length of a free end up to which it is a burr of the outline, over half the width where it begins
-)
-MERGED = 1.6  # length of an edge up to which its two nodes are one, over half the width there
-SHORT_LOOP = 4.0  # length of an edge below which it goes when its nodes are merged, over the same
+SPUR = 1.5  # how far the ink of a burr reaches, over half the width where it begins, and a pixel
 
 
 @dataclass
@@ -28,6 +24,8 @@ class Edge:
     """Places [px of the skeleton], with the nodes', shape (point, 2); in a ring the last is the first."""
     nodes: tuple[int, int]
     """Where it begins and ends; a ring has a node of its own."""
+    half_width: float
+    """Half the width of the ink along most of it [px of the skeleton]."""
 
     def length(self) -> float:
         """Return the length in pixels of the skeleton."""
@@ -35,7 +33,7 @@ class Edge:
 
     def backwards(self) -> Edge:
         """Return the same edge from its end."""
-        return Edge(self.points[::-1], self.nodes[::-1])
+        return replace(self, points=self.points[::-1], nodes=self.nodes[::-1])
 
 
 @dataclass
@@ -62,13 +60,7 @@ def find_graph(mask: Bools) -> tuple[Graph, Floats]:
     inside = np.pad(mask.astype(np.uint8), 1)
     radii = np.maximum(depth(mask) - 0.5, 0.5)
     thin = cv2.ximgproc.thinning(255 * inside, thinningType=cv2.ximgproc.THINNING_GUOHALL)[1:-1, 1:-1] > 0
-    graph = _graph(thin, radii)
-    for _ in range(3):
-        before = len(graph.edges)
-        graph = _with_joined_edges(_with_merged_nodes(_without_burrs(graph)))
-        if len(graph.edges) == before:
-            break
-    return graph, radii
+    return _without_burrs(_graph(thin, radii)), radii
 
 
 def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
@@ -106,14 +98,15 @@ def _graph(thin: Bools, radii: Floats) -> Graph:
     half = radii[pixels[:, 0], pixels[:, 1]]
     centers, width = _merged(places[members], half[members], owners, len(names))
     walks, rings = _walks(near, node_of, members)
-    edges = [
-        Edge(np.concatenate([centers[a : a + 1], places[path], centers[b : b + 1]]), (a, b))
+    chains = [
+        (np.concatenate([centers[a : a + 1], places[path], centers[b : b + 1]]), (a, b))
         for path, a, b in walks
     ]
     own = [ring[0] for ring in rings]
-    edges += [Edge(places[[*ring, ring[0]]], (len(names) + i,) * 2) for i, ring in enumerate(rings)]
-    lone = sorted(set(range(len(names))) - {node for edge in edges for node in edge.nodes})
-    edges += [Edge(np.repeat(centers[node : node + 1], 2, axis=0), (node, node)) for node in lone]
+    chains += [(places[[*ring, ring[0]]], (len(names) + i,) * 2) for i, ring in enumerate(rings)]
+    lone = sorted(set(range(len(names))) - {node for _, nodes in chains for node in nodes})
+    chains += [(np.repeat(centers[node : node + 1], 2, axis=0), (node, node)) for node in lone]
+    edges = [Edge(points, nodes, float(np.median(at_pixels(radii, points)))) for points, nodes in chains]
     return Graph(edges, np.concatenate([centers, places[own]]), np.concatenate([width, half[own]]))
 
 
@@ -161,51 +154,55 @@ def _walks(
 
 
 def _without_burrs(graph: Graph) -> Graph:
-    """Return the graph without free ends that are no longer than the line is wide; lone lines stay."""
-    free = [len(edges) == 1 for edges in graph.at]
+    """Return the graph without free ends that hardly reach beyond the ink they begin in; lone lines stay."""
+    while True:
+        free = [len(edges) == 1 for edges in graph.at]
 
-    def is_burr(edge: Edge) -> bool:
-        a, b = edge.nodes
-        if a == b or free[a] == free[b]:
-            return False
-        return edge.length() <= SPUR * max(float(graph.radii[b if free[a] else a]), 1.0)
+        def is_burr(edge: Edge, free: list[bool] = free, radii: Floats = graph.radii) -> bool:
+            a, b = edge.nodes
+            if a == b or free[a] == free[b]:
+                return False
+            tip, root = (float(radii[node]) for node in ((a, b) if free[a] else (b, a)))
+            return edge.length() + tip <= SPUR * root + 1
 
-    kept = [edge for edge in graph.edges if not is_burr(edge)]
-    held = {node for edge in kept for node in edge.nodes}
-    # Where only burrs meet there is a dot: the longest of them is kept.
-    for node, numbers in enumerate(graph.at):
-        if len(numbers) > 1 and node not in held:
-            kept.append(max((graph.edges[n] for n in numbers), key=Edge.length))
-    return Graph(kept, graph.places, graph.radii)
+        kept = [edge for edge in graph.edges if not is_burr(edge)]
+        if len(kept) == len(graph.edges):
+            return graph
+        held = {node for edge in kept for node in edge.nodes}
+        # Where only burrs meet there is a dot: the longest of them is kept.
+        for node, numbers in enumerate(graph.at):
+            if len(numbers) > 1 and node not in held:
+                kept.append(max((graph.edges[n] for n in numbers), key=Edge.length))
+        graph = with_joined_edges(Graph(kept, graph.places, graph.radii))
 
 
-def _with_merged_nodes(graph: Graph) -> Graph:
-    """Merge nodes that the width of the lines has drawn apart, so that crossings have four arms."""
+def contracted(graph: Graph, overlaps: list[int]) -> Graph:
+    """Return the graph with each of some edges, in which lines overlap, as one node with its ends."""
     sets = Sets(len(graph.places))
-    meets = [len(edges) > 2 for edges in graph.at]
-    rest = []
-    for edge in graph.edges:
-        a, b = edge.nodes
-        reach = MERGED * float(max(graph.radii[a], graph.radii[b]))
-        if a != b and meets[a] and meets[b] and edge.length() <= max(reach, 1.5):
-            sets.join(a, b)
-        else:
-            rest.append(edge)
+    for number in overlaps:
+        sets.join(*graph.edges[number].nodes)
     names = sets.numbers()
-    places, radii = _merged(graph.places, graph.radii, names, int(names.max(initial=-1)) + 1)
+    places, _ = _merged(graph.places, graph.radii, names, int(names.max(initial=-1)) + 1)
+    radii = np.zeros(len(places))
+    np.maximum.at(radii, names, graph.radii + hypot(*(graph.places - places[names]).T))
     edges = []
-    for edge in rest:
+    for number in sorted(set(range(len(graph.edges))) - set(overlaps)):
+        edge = graph.edges[number]
         a, b = (int(names[node]) for node in edge.nodes)
-        if a == b and edge.nodes[0] != edge.nodes[1] and edge.length() < SHORT_LOOP * radii[a]:
+        if a == b and edge.nodes[0] != edge.nodes[1] and _within(edge.points, places[a], radii[a]):
             continue
-        points = edge.points.copy()
-        if a != b:
-            points[0], points[-1] = places[a], places[b]
-        edges.append(Edge(points, (a, b)))
-    return Graph(edges, places, radii)
+        points = edge.points
+        if edge.nodes[0] != edge.nodes[1]:
+            points = np.concatenate([places[a : a + 1], points[1:-1], places[b : b + 1]])
+        edges.append(replace(edge, points=points, nodes=(a, b)))
+    return with_joined_edges(Graph(edges, places, radii))
 
 
-def _with_joined_edges(graph: Graph) -> Graph:
+def _within(points: Floats, place: Floats, radius: float) -> bool:
+    return bool((hypot(*(points - place).T) <= radius).all())
+
+
+def with_joined_edges(graph: Graph) -> Graph:
     """Make one edge of two that meet at a node where no other does."""
     at = [list(edges) for edges in graph.at]
     edges: list[Edge | None] = list(graph.edges)
@@ -216,7 +213,12 @@ def _with_joined_edges(graph: Graph) -> Graph:
         assert one is not None and other is not None
         one = one if one.nodes[1] == node else one.backwards()
         other = other if other.nodes[0] == node else other.backwards()
-        both = Edge(np.concatenate([one.points, other.points[1:]]), (one.nodes[0], other.nodes[1]))
+        longer = max(one, other, key=Edge.length)
+        both = replace(
+            longer,
+            points=np.concatenate([one.points, other.points[1:]]),
+            nodes=(one.nodes[0], other.nodes[1]),
+        )
         edges[numbers[0]], edges[numbers[1]] = both, None
         far = at[other.nodes[1]]
         far[far.index(numbers[1])] = numbers[0]

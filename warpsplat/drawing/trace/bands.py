@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from warpsplat.drawing import prices
+from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes, unchecked
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import Gradients, fit_ramp
@@ -22,10 +24,6 @@ SOFT = 1.5  # [px] standard deviation of the blur before a part is cut, so that 
 ONE_TONE = 1.0  # [levels] root mean square by which colours of one tone are off a line, besides noise
 POWERS = 8  # steps of the power iteration
 TONES = 64  # levels of tone among which a part is cut in two
-FLAT_BYTES, RAMP_BYTES = 100.0, 250.0  # of a band in a file, about, with a flat colour or a gradient
-FLOOR = 1.5  # [levels] root mean square of the error that edges leave in any file, about
-DOUBLING = 1 / 3
-"""Share of its error that a file may gain for a share of its bytes: about 1 dB for twice the bytes."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class _Piece:
 
     def bytes(self) -> float:
         """Return about the bytes in a file."""
-        return FLAT_BYTES if self.coloring.ramp is None else RAMP_BYTES
+        return prices.REGION if self.coloring.ramp is None else prices.SHADED
 
 
 def split_uneven(
@@ -71,19 +69,19 @@ def split_uneven(
     roots = _uneven(image, parts, UNEVEN + noise)
     if not roots:
         return parts
-    rest = image.size * (FLOOR + noise) ** 2
-    others = FLAT_BYTES * len(parts.paint) - sum(piece.bytes() for piece in roots)
+    rest = image.size * (255**2 * LEAST_ERROR + noise**2)
+    others = prices.REGION * len(parts.paint) - sum(piece.bytes() for piece in roots)
     leaves = [(-piece.error, number, piece) for number, piece in enumerate(roots)]
     heapq.heapify(leaves)
     made = len(leaves)
-    error, size = rest + sum(piece.error for piece in roots), FLAT_BYTES * len(parts.paint)
-    while leaves and made < MOST_BANDS and -leaves[0][0] > FLAT_BYTES * DOUBLING * error / size:
+    error, size = rest + sum(piece.error for piece in roots), prices.REGION * len(parts.paint)
+    while leaves and made < MOST_BANDS and -leaves[0][0] > prices.REGION * worth(error, size, negligible=0):
         check()
         piece = heapq.heappop(leaves)[2]
         halves = _halves(image, piece, gradients)
         gain = piece.error - sum(half.error for half in halves)
         growth = sum(half.bytes() for half in halves) - piece.bytes()
-        is_gain = gain / error > DOUBLING * growth / size
+        is_gain = gain > growth * worth(error, size, negligible=0)
         if len(halves) < 2 or not (is_gain or _is_one_tone(image[piece.box()][piece.mask], noise)):
             continue
         piece.halves.extend(halves)
@@ -95,7 +93,7 @@ def split_uneven(
     bands, fewer = list[_Piece](), roots
     while len(bands) != len(fewer):
         bands = fewer
-        fewer = [band for piece in roots for band in _worthwhile(piece, DOUBLING * error / size)]
+        fewer = [band for piece in roots for band in _worthwhile(piece, worth(error, size, negligible=0))]
         error, size = rest + sum(band.error for band in fewer), others + sum(band.bytes() for band in fewer)
     return _with_bands(image, parts, bands)
 
@@ -200,7 +198,7 @@ def _piece(image: Floats, left: int, top: int, mask: Bools, gradients: Gradients
     ramp = fit_ramp(box, mask, left, top, gradients)
     if ramp is not None:
         error = pixels.size * ramp.residual**2
-        if error < flat * FLAT_BYTES / RAMP_BYTES:
+        if error < flat * prices.REGION / prices.SHADED:
             return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
     return best
 

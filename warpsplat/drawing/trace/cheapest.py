@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -10,12 +10,13 @@ from warpsplat.drawing.trace.cubics import fit_handles
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.spans import Spans
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene.scene import ranges
+from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured
 LINE_COST, CUBIC_COST = 1.0, 1.4  # what a piece counts, about its bytes
 ERROR_COST = 0.35  # what an error of the size of the tolerance counts for each piece
 FORCED_COST = 2 * CUBIC_COST  # of a cubic between two knots that are neighbours, whatever its error
+MOST_KNOTS = 48  # between which all curves are tried
 STRIDE, FAR = 4, 2.0  # between knots whose pairs are tried first; tolerances of a piece that is far off
 PAIRS = 1 << 17  # of knots that are looked at together, about, which bounds the memory
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
@@ -52,12 +53,40 @@ class CurvePieces:
 def cheapest_chains(spans: Spans, tolerance: float) -> CurvePieces:
     """Return the pieces of the cheapest chain of each span, in order.
 
-    A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
-    three lines is cheaper than any of three: most spans need no other candidates.
+    Of a long span a few knots are tried first; where no curve from one to the next is near enough, those
+    between them, too.
 
     Args:
         spans: Not empty.
         tolerance: Largest distance of a point from its curve [px].
+    """
+    index, first = _few(spans.first)
+    chains = _chains(spans.at(index, first), tolerance)
+    owner = np.searchsorted(first, chains.begin, "right") - 1
+    chains = replace(chains, span=owner, begin=index[chains.begin], end=index[chains.end])
+    far = ~np.isfinite(chains.costs) & (chains.end > chains.begin + 1)
+    if far.any():
+        begin, counts = chains.begin[far], (chains.end - chains.begin)[far] + 1
+        inner = ranges(begin, counts)
+        parts = cheapest_chains(spans.at(inner, starts_of(counts)), tolerance)
+        parts = replace(parts, span=owner[far][parts.span], begin=inner[parts.begin], end=inner[parts.end])
+        chains = CurvePieces.joined([chains.take(~far), parts])
+    return chains.take(np.lexsort((chains.begin, chains.span)))
+
+
+def _few(first: Ints) -> tuple[Ints, Ints]:
+    """Return at most ``MOST_KNOTS`` knots of each span, evenly chosen, and the first of each span."""
+    steps = np.diff(first) - 1
+    counts = np.minimum(steps, MOST_KNOTS) + 1
+    owner, number = np.repeat(np.arange(len(steps)), counts), ranges(np.zeros_like(counts), counts)
+    return first[owner] + number * steps[owner] // (counts[owner] - 1), starts_of(counts)
+
+
+def _chains(spans: Spans, tolerance: float) -> CurvePieces:
+    """Return cheapest chains as ``cheapest_chains``, of spans with few knots.
+
+    A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
+    three lines is cheaper than any of three: most spans need no other candidates.
     """
     first, last = spans.first[:-1], spans.first[1:] - 1
     number = np.arange(len(first))

@@ -17,7 +17,6 @@ from warpsplat.scene.scene import starts_of
 OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
 MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
-NEAREST = 64  # shapes among which what lies between two is looked for first
 
 
 def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
@@ -45,15 +44,26 @@ def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
 
 def with_joined_lines(contours: list[Pieces]) -> list[Pieces]:
     """Return contours with one line for several that go on in the same direction."""
-    cubics, lines, before, first = _around(contours)
-    joined = lines & lines[before] & _are_straight_on(cubics[before], cubics)
-    any_joined = np.isin(
-        np.arange(len(contours)), np.searchsorted(first, np.flatnonzero(joined), "right") - 1
-    )
-    return [
-        _with_joined_lines(contour) if joined else contour
-        for contour, joined in zip(contours, any_joined.tolist(), strict=True)
-    ]
+    while True:
+        cubics, lines, before, first = _around(contours)
+        chord, here = cubics[:, 3] - cubics[before, 0], cubics[:, 0] - cubics[before, 0]
+        size, along = hypot(*chord.T), (here * chord).sum(axis=1)
+        off = np.abs(here[:, 0] * chord[:, 1] - here[:, 1] * chord[:, 0])
+        gone = lines & lines[before] & (along >= 0) & (along <= size * size) & (off <= OFF_LINE * size)
+        gone &= (size >= 1e-6) & ~gone[before] & np.repeat(np.diff(first) > 2, np.diff(first))
+        if not gone.any():
+            return contours
+        parts = np.split(gone, first[1:-1])
+        contours = [
+            _without(one, own) if own.any() else one for one, own in zip(contours, parts, strict=True)
+        ]
+
+
+def _without(contour: Pieces, gone: Bools) -> Pieces:
+    """Return a contour without the lines that are ``gone``: the one before each ends where it did."""
+    cubics, lines = contour.cubics[~gone], contour.lines[~gone]
+    ends = np.roll(cubics[:, 0], -1, axis=0)
+    return Pieces(np.where(lines[:, None, None], straight(cubics[:, 0], ends), cubics), lines)
 
 
 def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:
@@ -65,31 +75,6 @@ def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:
     cubics = np.concatenate([*(contour.cubics for contour in contours), np.zeros((0, 4, 2))])
     lines = np.concatenate([*(contour.lines for contour in contours), np.zeros(0, np.bool_)])
     return cubics, lines, before, first
-
-
-def _with_joined_lines(contour: Pieces) -> Pieces:
-    """Return a contour with one line for several that go on in the same direction."""
-    kept: list[Floats] = []
-    is_line: list[bool] = []
-    for cubic, line in zip(contour.cubics, contour.lines.tolist(), strict=True):
-        if line and kept and is_line[-1] and _are_straight_on(kept[-1], cubic):
-            kept[-1] = straight(kept[-1][0], cubic[3])
-        else:
-            kept.append(cubic)
-            is_line.append(line)
-    if len(kept) > 2 and is_line[0] and is_line[-1] and _are_straight_on(kept[-1], kept[0]):
-        kept[0] = straight(kept.pop()[0], kept[0][3])
-        is_line.pop()
-    return Pieces(np.asarray(kept), np.asarray(is_line, np.bool_))
-
-
-def _are_straight_on(ones: Floats, others: Floats) -> Bools:
-    """Return whether joints of two lines, (..., 4, 2), are on the line from the beginning to the end."""
-    chord, here = others[..., 3, :] - ones[..., 0, :], ones[..., 3, :] - ones[..., 0, :]
-    size = hypot(chord[..., 0], chord[..., 1])
-    forward = ((here * chord).sum(axis=-1) >= 0) & (((chord - here) * chord).sum(axis=-1) >= 0)
-    off = np.abs(here[..., 0] * chord[..., 1] - here[..., 1] * chord[..., 0])
-    return (size >= 1e-6) & forward & (off <= OFF_LINE * size)
 
 
 def joints_of(contours: list[Pieces]) -> Ints:
@@ -132,17 +117,10 @@ def merged(shapes: list[Fill]) -> list[Fill]:
     for shape in shapes:
         box, count = shape.box(), len(result)
         color = number_of.setdefault(id(shape.coloring), len(number_of))
-        target = None
-        for low, high in ((max(0, count - NEAREST), count), (0, max(0, count - NEAREST))):
-            own = boxes[low:high]
-            between = ((box[:2] < own[:, 2:]) & (own[:, :2] < box[2:])).all(axis=1)
-            same = colors[low:high] == color
-            stops = np.flatnonzero(between | same)
-            if len(stops):
-                target = low + int(stops[-1]) if same[stops[-1]] else None
-                break
-        if target is None:
-            target = count
+        between = ((box[:2] < boxes[:count, 2:]) & (boxes[:count, :2] < box[2:])).all(axis=1)
+        stops = np.flatnonzero(between | (colors[:count] == color))
+        target = int(stops[-1]) if len(stops) and colors[stops[-1]] == color else count
+        if target == count:
             result.append(Fill(shape.coloring, []))
             boxes[target] = box
         result[target].contours.extend(shape.contours)

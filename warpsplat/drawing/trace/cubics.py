@@ -9,11 +9,40 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 
 ROUNDS = 3  # of fitting handles and finding the parameters of the points
 LEAST_HANDLE, MOST_HANDLE = 0.02, 3.0  # over the chord
+
+SAMPLES = 12  # on each of two cubics that become one
+
+
+def handles_through(first: Floats, second: Floats) -> Floats:
+    """Return the handles of the cubics nearest to two that follow one another, shape (..., 2, 2).
+
+    They begin and end where those do, in the same directions; the lengths are fitted by least squares.
+
+    ``first`` and ``second``, which begins where ``first`` ends, have shape (..., 4, 2).
+    """
+    one, other = first.reshape(-1, 4, 2), second.reshape(-1, 4, 2)
+    t = np.arange(SAMPLES + 1) / SAMPLES
+    points = np.concatenate([points_at(one, t), points_at(other, t[1:])], axis=1)
+    start, end, ahead, back = one[:, 0], other[:, 3], _begun(one), _begun(other[:, ::-1])
+    lengths, _ = fit_handles(ahead.T, back.T, *(points - start[:, None]).transpose(2, 1, 0))
+    handles = np.stack([start + lengths[0][:, None] * ahead, end + lengths[1][:, None] * back], axis=1)
+    return handles.reshape(*first.shape[:-2], 2, 2)
+
+
+def _begun(cubics: Floats) -> Floats:
+    """Return the unit vectors in which cubics, shape (cubic, 4, 2), begin; 0 without extent."""
+    ways = cubics[:, 1:] - cubics[:, :1]
+    lengths = hypot(ways[..., 0], ways[..., 1])
+    first = np.arange(len(cubics)), (lengths > 1e-6).argmax(axis=1)
+    return np.where(
+        lengths[first][:, None] > 1e-6, ways[first] / np.maximum(lengths[first], 1e-6)[:, None], 0
+    )
 
 
 def fit_handles(ahead: Floats, back: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:

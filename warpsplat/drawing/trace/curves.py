@@ -8,9 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing.trace.cheapest import cheapest_chains
-from warpsplat.drawing.trace.ellipses import fit_ellipses
 from warpsplat.drawing.trace.grids import Bools, Floats
+from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.spans import Polyline, cut_at_corners
+from warpsplat.portable.elementary import hypot
+from warpsplat.scene.geometry import ARC_HANDLE
+
+AROUND = 64  # points of an outline that tell whether it is a circle
+QUARTER = np.array([(1, 0), (1, ARC_HANDLE), (ARC_HANDLE, 1), (0, 1)])
+QUARTERS = np.stack([QUARTER, QUARTER[:, ::-1] * (-1, 1), -QUARTER, QUARTER[:, ::-1] * (1, -1)])
 
 
 @dataclass(frozen=True)
@@ -32,15 +38,40 @@ def fit_polylines(runs: list[Polyline], tolerance: float) -> list[Pieces]:
     """
     found: list[Pieces | None] = [_polygon(run) for run in runs]
     rings = [i for i, run in enumerate(runs) if run.closed and not run.is_polygon]
-    is_ellipse, ellipses = fit_ellipses([runs[ring].points for ring in rings], tolerance)
-    for number, ellipse in zip(np.flatnonzero(is_ellipse).tolist(), ellipses, strict=True):
-        found[rings[number]] = Pieces(ellipse, np.zeros(4, np.bool_))
+    for number, circle in fit_circles([runs[ring].points for ring in rings], tolerance).items():
+        found[rings[number]] = Pieces(circle, np.zeros(4, np.bool_))
     rest = [i for i, pieces in enumerate(found) if pieces is None]
     if rest:
         curves = _fitted([runs[i] for i in rest], tolerance)
         for i, pieces in zip(rest, curves, strict=True):
             found[i] = _with_level_lines(pieces, runs[i].closed, tolerance)
     return [pieces for pieces in found if pieces is not None]
+
+
+def fit_circles(rings: list[Floats], tolerance: float) -> dict[int, Floats]:
+    """Return the four cubics of each closed outline (point, 2) that is a circle, by its number.
+
+    ``tolerance``: how far points may be from it [px].
+    """
+    lines, which = Polylines.joined(rings, [True] * len(rings)), np.repeat(np.arange(len(rings)), AROUND)
+    places = lines.totals[which] * np.tile(np.arange(AROUND) / AROUND, len(rings))
+    points = lines.at(which, places).reshape(-1, AROUND, 2)
+    center = points.mean(axis=1)
+    away = hypot(*(points - center[:, None]).transpose(2, 0, 1))
+    radius = away.mean(axis=1)
+    near = np.flatnonzero(np.abs(away - radius[:, None]).max(axis=1) <= tolerance).tolist()
+    made = {i: center[i] + radius[i] * QUARTERS for i in near}
+    return {
+        i: made[i] if area > 0 else made[i][::-1, ::-1]
+        for i, area in zip(near, areas_of(points[near]), strict=True)
+    }
+
+
+def areas_of(points: Floats) -> Floats:
+    """Return the signed areas of polygons (polygon, point, 2), those of clockwise ones positive."""
+    x, y = points[..., 0], points[..., 1]
+    doubled: Floats = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    return doubled / 2
 
 
 def straight(start: Floats, end: Floats) -> Floats:

@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 import heapq
-import math
 from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import Floats, Ints, Sets
+from warpsplat.drawing.trace.nesting import shared_borders
 from warpsplat.drawing.trace.regions import Regions
 
-LEAST_ERROR = 3e-5
-"""Mean squared error of a drawing without noise, sRGB in [0, 1]: 45 dB."""
 
-WORTH = 0.6
-"""Share by which the error may grow for the bytes of all regions at the usual price: 1.8 dB for half."""
+def fewer_regions(regions: Regions, most: int, price: float = 1.0) -> Regions:
+    """Merge regions, the pair that changes the image least first.
 
-
-def fewer_regions(regions: Regions, most: int) -> Regions:
-    """Merge regions, the pair that changes the image least first, until there are no more than ``most``."""
-    return regions if len(regions.paint) <= most else _merged(regions, most, math.inf)
-
-
-def worthwhile_regions(regions: Regions, price: float) -> Regions:
-    """Merge regions that show less than their bytes are worth beyond the usual ``price`` of 1.
-
-    All regions are taken to need as many bytes, so that no size has to be known.
+    Args:
+        regions: All take as many bytes, so that no size has to be known.
+        most: Regions that are left at the most.
+        price: Of a byte, over its usual one: beyond 1, regions that show less than that is worth go too.
     """
-    if price <= 1:
+    count, values = len(regions.paint), 3 * regions.labels.size
+    if count <= most and price <= 1:
         return regions
-    count, pixels = len(regions.paint), regions.labels.size
-    error = max(3 * 255**2 * LEAST_ERROR, 3 * regions.noise**2)
-    return _merged(regions, 1, (price - 1) * WORTH * error * pixels / count)
-
-
-def _merged(regions: Regions, most: int, dearest: float) -> Regions:
-    """Merge regions until ``most`` are left, or a merge would add a squared error above ``dearest``."""
-    count = len(regions.paint)
+    byte = prices.worth((regions.noise / 255) ** 2, prices.REGION * count, price=max(price - 1, 0))
+    dearest = values * 255**2 * prices.REGION * byte
+    beside: list[set[int]] = [set() for _ in range(count)]
+    for a, b in shared_borders(regions.labels, count):
+        beside[a].add(b)
+        beside[b].add(a)
     sizes = np.bincount(regions.labels.reshape(-1), minlength=count).tolist()
     colors = np.array([coloring.color for coloring in regions.colorings])[regions.paint]
-    merged = _merge(_neighbours(regions.labels), sizes, colors, most, dearest)
+    merged = _merge(beside, sizes, colors, most, dearest)
     numbers = np.unique(merged, return_inverse=True)[1]
     labels = numbers[regions.labels].astype(np.int32)
     paint = np.zeros(int(numbers.max()) + 1, np.int32)
@@ -51,19 +43,6 @@ def _merged(regions: Regions, most: int, dearest: float) -> Regions:
     return replace(regions, labels=labels, paint=paint, fills=fills)
 
 
-def _neighbours(labels: Ints) -> list[set[int]]:
-    count = int(labels.max()) + 1
-    first = np.concatenate([labels[:, 1:].reshape(-1), labels[1:].reshape(-1)]).astype(np.int64)
-    second = np.concatenate([labels[:, :-1].reshape(-1), labels[:-1].reshape(-1)])
-    keys = np.unique(first * count + second)
-    beside: list[set[int]] = [set() for _ in range(count)]
-    for a, b in zip((keys // count).tolist(), (keys % count).tolist(), strict=True):
-        if a != b:
-            beside[a].add(b)
-            beside[b].add(a)
-    return beside
-
-
 def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, dearest: float) -> Ints:
     """Return for each region the one that it is merged into, or itself.
 
@@ -72,10 +51,9 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
         sizes: Pixels of each region; changed in place.
         colors: Shape (region, 4).
         most: Regions that are to be left.
-        dearest: Squared error that a merge may add [levels squared].
+        dearest: Squared error that a merge may add if there are no more [levels squared].
     """
-    count = len(beside)
-    sets = Sets(count)
+    sets, left, gone = Sets(len(beside)), len(beside), [False] * len(beside)
     heap: list[tuple[float, int, int, int]] = []  # cost, region, neighbour, size of the region at the time
 
     def push(region: int) -> None:
@@ -86,12 +64,11 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
             best = int(costs.argmin())
             heapq.heappush(heap, (float(costs[best]), region, near[best], sizes[region]))
 
-    for region in range(count):
+    for region in range(left):
         push(region)
-    left, gone = count, [False] * count
-    while left > most and heap:
+    while heap and left > 1:
         cost, region, into, size = heapq.heappop(heap)
-        if cost > dearest:
+        if left <= most and cost > dearest:
             break
         if gone[region]:
             continue
@@ -107,5 +84,5 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
                 beside[other].add(into)
                 beside[into].add(other)
         sets.join(region, into)
-    stayed = {sets.find(region): region for region in range(count) if not gone[region]}
-    return np.asarray([stayed[sets.find(region)] for region in range(count)], np.int64)
+    stayed = {sets.find(region): region for region in np.flatnonzero(~np.array(gone)).tolist()}
+    return np.asarray([stayed[sets.find(region)] for region in range(len(gone))], np.int64)

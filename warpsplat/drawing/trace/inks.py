@@ -30,7 +30,13 @@ def with_inks(regions: Regions) -> Regions:
         own = painted == k
         beside = painted[dilated(own, 5) & ~own]
         bases[k] = base = colors[max(solid, key=lambda j: int((beside == j).sum()))]
+        toward = colors[k] - base
         pixels = regions.image[own]
+        share = ((pixels - base) * toward).sum(axis=1) / max(float((toward**2).sum()), 1.0)
+        off = channel_max(np.abs(pixels - base - share[:, None] * toward))
+        # What is more of a colour than the usual one is off by as much more.
+        near = off <= np.maximum(share, 1) * (1 + regions.noise)
+        pixels = pixels[near] if near.any() else pixels
         order = np.argsort(-((pixels - base) ** 2).sum(axis=1), kind="stable")
         colors[k] = np.round(np.median(pixels[order[:DARKEST]], axis=0))
     paint, colorings, inks = regions.paint.copy(), list(regions.colorings), list(solid)
@@ -47,6 +53,9 @@ def with_inks(regions: Regions) -> Regions:
 
 def _is_solid(image: Floats, own: Bools, color: Floats) -> bool:
     """Return whether a colour covers an area, or a line as long as no letter's."""
+    rows, columns = np.flatnonzero(own.any(axis=1)), np.flatnonzero(own.any(axis=0))
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    image, own = image[box], own[box]
     inner = np.flatnonzero(eroded(own, 3))
     if len(inner):  # one place is likely to tell, at a fraction of the time
         y, x = divmod(int(inner[len(inner) // 2]), own.shape[1])

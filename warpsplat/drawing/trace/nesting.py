@@ -8,7 +8,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints
 from warpsplat.drawing.trace.palette import Coloring
-from warpsplat.drawing.trace.regions import Regions
+from warpsplat.drawing.trace.partition import Partition
 
 OPAQUE = 253.0  # [levels] opacity from which on a region is opaque
 IMPOSSIBLE = 2.0  # [levels] that no paint makes up for, at the most
@@ -46,22 +46,22 @@ class Nesting:
         return full
 
 
-def find_nesting(regions: Regions) -> Nesting:
+def find_nesting(partition: Partition) -> Nesting:
     """Return which of the translucent bands of smooth shading may lie on one another."""
-    count = len(regions.paint)
-    own = [regions.colorings[paint] for paint in regions.paint.tolist()]
+    count = len(partition.paint)
+    own = [partition.colorings[paint] for paint in partition.paint.tolist()]
     parent, depth = np.full(count, NO_REGION, np.int64), np.zeros(count, np.int64)
     bands = [i for i, each in enumerate(own) if each.is_band and not each.is_clear and each.color[3] < OPAQUE]
     colorings = list(own)
     if not bands:
         return Nesting(parent, depth, colorings)
-    shared = _shared_borders(regions.labels, count)
+    shared = shared_borders(partition.labels, count)
     known: dict[tuple[int, int], Coloring] = {}
     for band in sorted(bands, key=lambda band: float(own[band].color[3])):
         for below in sorted(bands, key=lambda below: -shared.get((min(band, below), max(band, below)), 0)):
             if (min(band, below), max(band, below)) not in shared:
                 break
-            key = int(regions.paint[band]), int(regions.paint[below])
+            key = int(partition.paint[band]), int(partition.paint[below])
             over = known.get(key) or _painted_over(own[band], own[below])
             if over is not None:
                 known[key] = colorings[band] = over
@@ -70,7 +70,7 @@ def find_nesting(regions: Regions) -> Nesting:
     return Nesting(parent, depth, colorings)
 
 
-def _shared_borders(labels: Ints, count: int) -> dict[tuple[int, int], int]:
+def shared_borders(labels: Ints, count: int) -> dict[tuple[int, int], int]:
     """Return the length of the border of each two regions that have one [px], the smaller number first."""
     one = np.concatenate([labels[:, 1:].reshape(-1), labels[1:].reshape(-1)]).astype(np.int64)
     other = np.concatenate([labels[:, :-1].reshape(-1), labels[:-1].reshape(-1)]).astype(np.int64)

@@ -12,19 +12,17 @@ import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
-from warpsplat.drawing.trace.lattice import MOST_COLORS, Lattice, find_lattice
+from warpsplat.drawing.trace.lattice import MOST_COLORS, SNAP, Lattice, find_lattice
 from warpsplat.errors import ImageError
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
 from warpsplat.scene.scene import starts_of
 
-MOST_CELLS = 1 << 18  # of pixel art: nobody would edit the outlines of more
+MOST_CELLS = 262_144  # of pixel art: nobody would edit the outlines of more
 
 Point = tuple[int, int]
 STRIP_ROWS = 64  # compared at once, which bounds the memory
 MOST_CORNERS = 32_000  # of a shape
-SAME = 0.5 / 255  # difference below which colours are one in 8 bits
 FINE = 0.25  # [px] that the borders of cells are rounded to
-SAME_SIDE = 0.002  # largest share that one side of a cell may be longer
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,8 @@ def find_cells(image: FloatArray) -> PixelArt:
 def _of_lattice(lattice: Lattice, width: int, height: int) -> PixelArt:
     """Return the cells of a lattice: in units of a cell if the image begins with one, else of ``FINE`` px."""
     columns, rows = lattice.columns, lattice.rows
-    is_aligned = columns.origin == rows.origin == 0 and abs(columns.period / rows.period - 1) < SAME_SIDE
+    longer = abs(height / columns.period - height / rows.period)  # what the sides of cells add up to [cells]
+    is_aligned = columns.origin == rows.origin == 0 and longer < SNAP
     per_pixel = 1 / columns.period if is_aligned else 1 / FINE
     across, down = columns.borders(width), rows.borders(height)
     if is_aligned:
@@ -206,7 +205,7 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         background = np.asarray(cells.palette[paper], np.float32)
         seen = np.arange(len(sets)) != paper
     else:
-        seen = (np.abs(cells.palette - background) > SAME).any(axis=1)
+        seen = (np.round(255 * cells.palette) != np.round(255 * background)).any(axis=1)
     shown = [(i, rings) for i in np.flatnonzero(seen).tolist() for rings in sets[i]]
     contours = [[_lines(ring, cells) for ring in rings] for _, rings in shown]
     palette = np.asarray(cells.palette[[i for i, _ in shown]], np.float32)

@@ -15,7 +15,7 @@ from warpsplat.scene.scene import ranges, starts_of
 
 FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest scale
 BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
-SPACING, MOST_KNOTS = 1.5, 48  # [px] between knots, about; and how many a span has, at the most
+SPACING = 1.5  # [px] between knots, about
 WINDOW = 4.0  # [px] of outline on each side of a knot that tells its place and tangent
 END_WEIGHT = 16.0  # of a corner or junction, which is known exactly
 RANK = 1e-24  # what is left of a sum of squares, over the whole, that counts as 0
@@ -34,6 +34,11 @@ class Polyline:
     end: Floats | None = None
     is_polygon: bool = False
     """Whether the points are corners."""
+
+    def scaled(self, factor: float) -> Polyline:
+        """Return the outline at another size."""
+        start, end = (None if each is None else each * factor for each in (self.start, self.end))
+        return Polyline(self.points * factor, self.closed, start, end, self.is_polygon)
 
     def with_ends(self) -> Floats:
         """Return the points and, of an open one, its ends; none of them twice in a row."""
@@ -61,6 +66,11 @@ class Spans:
     """Unit vectors there, shape (knot, 2)."""
     places: Ints
     """Number of the point at each knot, shape (knot,)."""
+
+    def at(self, index: Ints, first: Ints) -> Spans:
+        """Return spans of the knots ``index``, each of them part of one here; ``first``: as here."""
+        owner = self.owner[np.searchsorted(self.first, index[first[:-1]], "right") - 1]
+        return Spans(owner, self.points, first, self.knots[index], self.tangents[index], self.places[index])
 
 
 def cut_at_corners(runs: Sequence[Polyline], tolerance: float) -> Spans:
@@ -124,7 +134,7 @@ def _between(lines: Polylines, which: Ints, low: Floats, high: Floats) -> tuple[
 
 def _with_knots(owner: Ints, parts: Polylines) -> Spans:
     """Return spans of the points of ``parts``, of runs ``owner``."""
-    counts = np.clip(parts.totals / SPACING, 1, MOST_KNOTS).astype(np.intp)
+    counts = np.maximum(parts.totals / SPACING, 1).astype(np.intp)
     span, number = np.repeat(np.arange(len(parts)), counts + 1), ranges(np.zeros_like(counts), counts + 1)
     first, last = parts.first[:-1][span], parts.first[1:][span] - 1
     wanted = number * (parts.totals / counts)[span]

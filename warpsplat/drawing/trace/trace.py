@@ -12,8 +12,8 @@ import numpy.typing as npt
 from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.fewer import fewer_regions, worthwhile_regions
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, unchecked
+from warpsplat.drawing.trace.fewer import fewer_regions
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Ints, unchecked
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
@@ -27,12 +27,12 @@ from warpsplat.drawing.trace.order import (
 )
 from warpsplat.drawing.trace.outlines import Boundary, find_boundary
 from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.partition import Partition, find_partition
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.ramps import Gradients
-from warpsplat.drawing.trace.regions import Regions, find_regions
+from warpsplat.drawing.trace.regions import find_regions
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import Layers, find_outlines
-from warpsplat.drawing.trace.sub_pixels import with_sub_pixels
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import GRADIENTS
 from warpsplat.scene.scene import numbers_in, starts_of
@@ -79,35 +79,34 @@ def trace(
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
     height, width = levels.shape[:2]
     regions = find_regions(levels, price, check, gradients, noise)
-    regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA))
-    regions = worthwhile_regions(regions, price)
-    traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)
+    regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA), price)
+    traced = trace_partition(find_partition(regions), may_have_ground=is_opaque, check=check)
     target = len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
         # Regions of one colour may be one path, so that there may be more of them than paths.
         target = max(2, min(target - 1, int(target * most / len(traced.scene))))
         regions = fewer_regions(regions, target)
-        traced = trace_regions(with_sub_pixels(regions), may_have_ground=is_opaque, check=check)
+        traced = trace_partition(find_partition(regions), may_have_ground=is_opaque, check=check)
     return traced
 
 
-def trace_regions(
-    regions: Regions, *, may_have_ground: bool = True, check: Callable[[], None] = unchecked
+def trace_partition(
+    partition: Partition, *, may_have_ground: bool = True, check: Callable[[], None] = unchecked
 ) -> Traced:
-    """Trace the outlines of regions.
+    """Trace the outlines of partition.
 
     Args:
-        regions: Of an image.
+        partition: Of an image.
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
         check: As for ``trace``.
     """
     check()
-    nesting, count = find_nesting(regions), len(regions.paint)
-    flat = replace(regions, labels=nesting.shown(0)[regions.labels])
-    loops = find_loops(flat.labels, flat.image)
+    nesting, count = find_nesting(partition), len(partition.paint)
+    flat = replace(partition, labels=nesting.shown(0)[partition.labels])
+    loops = find_loops(flat.labels, flat.fills)
     boundary = find_boundary(loops, flat)
     tree = find_tree(loops, count)
-    unpainted, ground = _ground(regions, tree, may_have_ground=may_have_ground)
+    unpainted, ground = _ground(partition, tree, may_have_ground=may_have_ground)
     sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
     ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
     layers = _layers(flat, loops, boundary, tree, ranks)
@@ -115,78 +114,96 @@ def trace_regions(
     outlines = find_outlines(layers)
     for depth in range(1, int(nesting.depth.max()) + 1):
         check()
-        layer = replace(regions, labels=nesting.shown(depth)[regions.labels])
-        inner = find_loops(layer.labels, layer.image, nesting.depth == depth)
+        layer = replace(partition, labels=nesting.shown(depth)[partition.labels])
+        inner = find_loops(layer.labels, layer.fills, nesting.depth == depth)
         # Bands hide nothing, so that the cover is the same at all depths.
         layers = replace(layers, loops=inner, boundary=find_boundary(inner, layer), has_holes=True)
         outlines += find_outlines(layers)
-    runs = [part for _, outline in outlines for part in outline if isinstance(part, Polyline)]
-    tolerance, curves = tolerance_of(boundary.offsets, loops, regions), list[Pieces]()
+    units = _units(loops, sizes, partition.scale)
+    contours: dict[int, list[Pieces]] = {}
+    for unit in range(1, partition.scale + 1):
+        some = [(region, outline) for region, outline in outlines if units[region] == unit]
+        for region, contour in _fitted(some, unit, partition, check):
+            contours.setdefault(region, []).append(contour)
+    shapes = [
+        Fill(nesting.colorings[region], contours[region])
+        for region in sorted(contours, key=lambda region: ranks[region])
+    ]
+    height, width = (side // partition.scale for side in partition.labels.shape)
+    background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
+    return _scene(Canvas(width, height, background), merged(shapes))
+
+
+def _units(loops: Loops, sizes: Ints, scale: int) -> Ints:
+    """Return the unit in which lengths along the outline of each region are compared [cell], shape (region,).
+
+    It is a pixel, which is what rounds corners off, or less for what is narrow. ``sizes``: cells of regions.
+    """
+    inner = loops.region != NO_REGION
+    lengths = np.bincount(loops.region[inner], np.diff(loops.first)[inner], len(sizes))
+    widths = 2 * sizes / np.maximum(lengths, 1)
+    return np.asarray(np.clip(widths / NARROW, 1, scale), np.intp)
+
+
+def _fitted(
+    outlines: list[tuple[int, list[Any]]], unit: int, partition: Partition, check: Callable[[], None]
+) -> list[tuple[int, Pieces]]:
+    """Return the contour of each outline, in pixels; those of less than two curves are left out."""
+    scaled = [
+        (region, [part.scaled(1 / unit) if isinstance(part, Polyline) else part / unit for part in outline])
+        for region, outline in outlines
+    ]
+    runs = [part for _, outline in scaled for part in outline if isinstance(part, Polyline)]
+    tolerance, curves = partition.scale / unit * (TOLERANCE + partition.doubt), list[Pieces]()
     for first in range(0, len(runs), RUNS_TOGETHER):
         check()
         curves += fit_polylines(runs[first : first + RUNS_TOGETHER], tolerance)
     fitted = iter(curves)
     found = [
         (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
-        for region, outline in outlines
+        for region, outline in scaled
     ]
     known = [(region, contour) for region, contour in found if contour is not None]
-    contours: dict[int, list[Pieces]] = {}
     joined = with_joined_lines([contour for _, contour in known])
-    for (region, _), contour in zip(known, joined, strict=True):
-        if len(contour.cubics) > 1:
-            contours.setdefault(region, []).append(replace(contour, cubics=contour.cubics / regions.scale))
-    shapes = [
-        Fill(nesting.colorings[region], contours[region])
-        for region in sorted(contours, key=lambda region: ranks[region])
+    return [
+        (region, replace(contour, cubics=contour.cubics * (unit / partition.scale)))
+        for (region, _), contour in zip(known, joined, strict=True)
+        if len(contour.cubics) > 1
     ]
-    height, width = (side // regions.scale for side in regions.labels.shape)
-    background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
-    return _scene(Canvas(width, height, background), merged(shapes))
 
 
-def _layers(regions: Regions, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
+def _layers(partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
     """Return regions as they lie on one another by their ranks."""
-    is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in regions.colorings])[regions.paint]
+    is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in partition.colorings])[partition.paint]
     hiding = np.where(is_opaque, ranks, -1)
     holed = has_inside(tree, ~is_opaque)
     # Something transparent may lie between regions as well as inside one; what reaches the border of the
     # image is not between them.
     has_holes = bool(enclosed(loops, holed).any())
-    cover = Cover(hiding[regions.labels])
+    cover = Cover(hiding[partition.labels])
     return Layers(loops, boundary, ranks, hiding, cover, in_holes_with(loops, holed), has_holes)
 
 
-TOLERANCE = 0.2  # [px] largest distance of an antialiased outline from its curve
-STAIRCASE_TOLERANCE = 0.62  # [px] the same without antialiasing: steps are half a pixel off
-SUB_PIXEL_TOLERANCE = 0.14  # [px] the same of one of sub-pixels
-NOISE_TOLERANCE = 0.02  # [px] that a level of noise adds
+NARROW = 8.0
+"""Least width of a region in units of length, so that corners are compared within its parts."""
+
+TOLERANCE = 0.1
+"""Largest distance of an outline of known place from its curve [px]."""
 
 
-def tolerance_of(offsets: Floats, loops: Loops, regions: Regions) -> float:
-    """Return how near curves must follow the boundary; without antialiasing it is a staircase."""
-    if regions.scale > 1:
-        return regions.scale * SUB_PIXEL_TOLERANCE
-    inner = loops.others >= 0
-    moved = np.abs(offsets[inner]) > 0.03
-    if not len(moved):
-        return TOLERANCE
-    return (STAIRCASE_TOLERANCE if moved.mean() < 0.1 else TOLERANCE) + NOISE_TOLERANCE * regions.noise
-
-
-def _ground(regions: Regions, tree: Tree, *, may_have_ground: bool) -> tuple[Bools, Coloring | None]:
+def _ground(partition: Partition, tree: Tree, *, may_have_ground: bool) -> tuple[Bools, Coloring | None]:
     """Return which regions are not painted, and the colour of the canvas; None if it is transparent."""
-    clear = np.array([coloring.is_clear for coloring in regions.colorings])[regions.paint]
-    opaque = all(regions.colorings[paint].color[3] >= OPAQUE for paint in numbers_in(regions.paint))
+    clear = np.array([coloring.is_clear for coloring in partition.colorings])[partition.paint]
+    opaque = all(partition.colorings[paint].color[3] >= OPAQUE for paint in numbers_in(partition.paint))
     if not may_have_ground or not opaque or clear.any():
         return clear, None
-    painted = regions.paint[regions.labels]
+    painted = partition.paint[partition.labels]
     edge = np.concatenate([painted[0], painted[-1], painted[:, 0], painted[:, -1]])
-    areas = np.bincount(painted.reshape(-1), minlength=len(regions.colorings))
+    areas = np.bincount(painted.reshape(-1), minlength=len(partition.colorings))
     paint = int((areas * np.isin(np.arange(len(areas)), edge)).argmax())
-    if regions.colorings[paint].ramp is not None:
-        return np.zeros(len(regions.paint), np.bool_), None
-    return bare_ground(tree, regions.paint == paint), regions.colorings[paint]
+    if partition.colorings[paint].ramp is not None:
+        return np.zeros(len(partition.paint), np.bool_), None
+    return bare_ground(tree, partition.paint == paint), partition.colorings[paint]
 
 
 def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpsplat.drawing.merge import handles_through
 from warpsplat.drawing.trace.beziers import points_at
+from warpsplat.drawing.trace.cubics import handles_through
 
 CURVES = {
     "arc": [[0, 0], [0, 5.5], [4.5, 10], [10, 10]],

@@ -1,0 +1,51 @@
+"""Closed contours: their lines, their joints, and shapes of one colour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
+from warpsplat.drawing.trace.curves import Pieces, straight
+from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.scene.attributes import Joint
+
+
+def ring(*corners: tuple[float, float]) -> Pieces:
+    ends = np.array(corners, float)
+    return Pieces(straight(ends, np.roll(ends, -1, axis=0)), np.ones(len(ends), np.bool_))
+
+
+def test_lines_that_go_on_are_one() -> None:
+    """However many there are, also around the beginning; a triangle is left as it is."""
+    square = ring((5, 0), (10, 0.02), (10, 4), (10, 7), (10, 9), (10, 10), (0, 10), (0, 0))
+    made, triangle = with_joined_lines([square, ring((0, 0), (9, 0), (0, 9))])
+    np.testing.assert_allclose(made.cubics[:, 0], [(10, 0.02), (10, 10), (0, 10), (0, 0)])
+    np.testing.assert_allclose(made.cubics[:, 3], np.roll(made.cubics[:, 0], -1, axis=0))
+    assert made.lines.all() and len(triangle.cubics) == 3
+
+
+def test_lines_beside_curves_stay() -> None:
+    bent = ring((0, 0), (5, 0), (10, 0), (10, 10))
+    bent.cubics[1, 1:3, 1] = 1
+    curved = Pieces(bent.cubics, np.array([True, False, True, True]))
+    (made,) = with_joined_lines([curved])
+    np.testing.assert_array_equal(made.cubics, curved.cubics)
+
+
+def test_parts_are_joined_by_lines() -> None:
+    made = assembled([np.array([(0.0, 0.0), (5.0, 0.0)]), np.array([(5.0, 5.0)])])
+    assert made is not None and len(made.cubics) == 3 and made.lines.all()
+    assert assembled([np.zeros((0, 2))]) is None
+    assert joints_of([made]).tolist() == [Joint.CORNER, Joint.LINE_HANDLE, Joint.LINE_HANDLE] * 3
+
+
+def test_shapes_of_one_colour_are_one_unless_something_lies_between() -> None:
+    red, blue = Coloring(np.array([255.0, 0, 0, 255])), Coloring(np.array([0, 0, 255.0, 255]))
+
+    def square(coloring: Coloring, x: float) -> Fill:
+        return Fill(coloring, [ring((x, 0), (x + 8, 0), (x + 8, 8), (x, 8))])
+
+    apart = merged([square(red, 0), square(blue, 20), square(red, 40)])
+    assert [len(fill.contours) for fill in apart] == [2, 1]
+    over = merged([square(red, 0), square(blue, 4), square(red, 8)])
+    assert [len(fill.contours) for fill in over] == [1, 1, 1]

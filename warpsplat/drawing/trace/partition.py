@@ -1,0 +1,217 @@
+"""The plane cut up into regions, whose boundaries are contours of shares.
+
+The share of a colouring in a pixel is the area that it covers there. A sum of cubic B-splines, one for each
+pixel, is found that is above a half on just this area of each pixel: where it is a half, there is the
+boundary. So thin lines and small letters, which fill no pixel, have smooth outlines, too, and the colours of
+a pixel get the areas that it shows (as in sub-pixel mapping: Atkinson 1997, "Mapping sub-pixel boundaries
+from remotely sensed images").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, components, dilated
+from warpsplat.drawing.trace.inks import with_inks
+from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.regions import Regions
+from warpsplat.drawing.trace.shares import Shares, beside_borders, find_shares
+from warpsplat.scene.scene import numbers_in
+
+SCALES = 4, 3, 2
+"""Cells of a grid finer than the pixels along one, the finest first."""
+
+MOST_CELLS = 1 << 20
+"""Cells of such a grid, which bounds time and memory."""
+
+MOST_DOUBT = 0.1
+"""How far off boundaries may be on such a grid [cell]: what is finer shows noise."""
+
+STEPS, RATE = 16, 0.3
+"""Corrections of a sum of B-splines, and how much of the area that a pixel lacks is added to its coefficient:
+more would not converge where lines are dense."""
+
+REACH = 2
+"""Pixels on each side of a pixel whose B-splines are not 0 there."""
+
+GENTLEST = 0.7
+"""Least slope of the sum at a boundary [1/px]: a gentler one tells little about the place of the boundary."""
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Connected regions on a grid of cells, of which one or several lie along a pixel."""
+
+    labels: Ints
+    """The region of each cell, shape (row, column)."""
+    fills: Floats
+    """The colour of each cell, shape (row, column, 4)."""
+    lead: Floats
+    """How far the colouring of a cell is ahead of any other there, shape (row, column): 0 at a boundary."""
+    paint: Ints
+    """The colouring of each region, shape (region,)."""
+    colorings: list[Coloring]
+    scale: int
+    """Cells along a pixel."""
+    doubt: float
+    """How far off shares of pixels at boundaries are, and so the boundaries [px]."""
+
+
+def find_partition(regions: Regions) -> Partition:
+    """Return regions with boundaries between and within the pixels of their image."""
+    regions = with_inks(regions)
+    shares = find_shares(regions)
+    at_border = beside_borders(shares.first) | (shares.share < 1)
+    doubt = float(shares.doubt[at_border].mean()) if at_border.any() else 0.0
+    pixels = regions.labels.size
+    scale = next((s for s in SCALES if s * s * pixels <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
+    # A border between pixels that are surely of one colouring each is exactly there.
+    is_open = at_border & ((shares.share < 1) | (shares.doubt > 0))
+    rows, columns = np.nonzero(dilated(is_open, 3))
+    painted = _in_cells(shares.first, scale)
+    lead = np.ones(painted.shape, np.float32)
+    down, right = np.ogrid[:scale, :scale]
+    cells = scale * rows[:, None, None] + down, scale * columns[:, None, None] + right
+    painted[cells], runner_up, lead[cells] = _leading(shares, rows, columns, scale)
+    doubtful = _doubtful(painted, cells, shares.doubt[rows, columns], scale)
+    painted[cells] = np.where(doubtful, runner_up, painted[cells])
+    fills = shares.colors.at(painted, *(each // scale for each in np.indices(painted.shape, np.int32)))
+    labels = components(painted, fills)
+    paint = np.zeros(int(labels.max()) + 1, np.int32)
+    paint[labels] = painted
+    return Partition(labels, fills, lead, paint, regions.colorings, scale, doubt)
+
+
+def _in_cells(values: Any, scale: int) -> Any:
+    """Return pixels (height, width, ...) as cells: each of them ``scale`` times along both sides."""
+    return np.repeat(np.repeat(values, scale, axis=0), scale, axis=1)
+
+
+def _doubtful(painted: Ints, cells: tuple[Ints, Ints], doubt: Floats, scale: int) -> Bools:
+    """Return which cells are in regions that are smaller than what their shares may be off.
+
+    Args:
+        painted: The colouring of each cell of the image.
+        cells: Rows and columns of the cells of some pixels, broadcast to (pixel, scale, scale).
+        doubt: How far off shares of these pixels may be, shape (pixel,).
+        scale: Cells along a pixel.
+    """
+    parts = components(painted, painted[..., None].astype(np.float32))
+    sizes, own = np.bincount(parts.reshape(-1)), parts[cells]
+    known = np.bincount(own.reshape(-1), minlength=len(sizes))
+    touched = np.unique(
+        own.astype(np.int64).reshape(len(own), scale**2) + len(sizes) * np.arange(len(own))[:, None]
+    )
+    pixel, part = np.divmod(touched, len(sizes))
+    off = np.bincount(part, doubt[pixel], len(sizes)) * scale**2
+    return ((known == sizes) & (sizes < off))[own]
+
+
+def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Ints, Ints, Floats]:
+    """Return the colouring of each cell of some pixels, the next one, and how far it is ahead of that.
+
+    Shape (pixel, scale, scale) each.
+    """
+    shape = len(rows), scale, scale
+    painted, runner_up = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    most, next_ = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.float32)
+    one, other = shares.first[rows, columns], shares.second[rows, columns]
+    numbers = numbers_in(np.concatenate([one, other])).tolist()
+    index = np.full(shares.share.shape, -1, np.intp)
+    index[rows, columns] = np.arange(len(rows))
+    for k in numbers:
+        own = (one == k) | (other == k)
+        box = _around(rows[own], columns[own])
+        if len(numbers) == 2:  # one is where the other is not
+            values = _level(shares.of(k, np.s_[:, :]), rows, columns, shares.doubt, scale)
+            is_first = values >= 0.5
+            return np.where(is_first, *numbers), np.where(is_first, *numbers[::-1]), np.abs(2 * values - 1)
+        share, number = shares.of(k, box), index[box]
+        near_rows, near_columns = np.nonzero(dilated(share > 0, 3) & (number >= 0))
+        some = number[near_rows, near_columns]
+        values = _level(share, near_rows, near_columns, shares.doubt[box], scale)
+        is_most, is_next = values > most[some], values > next_[some]
+        runner_up[some] = np.where(is_most, painted[some], np.where(is_next, k, runner_up[some]))
+        painted[some] = np.where(is_most, k, painted[some])
+        next_[some] = np.maximum(next_[some], np.minimum(values, most[some]))
+        most[some] = np.maximum(values, most[some])
+    return painted, runner_up, most - next_
+
+
+def _around(rows: Ints, columns: Ints) -> tuple[slice, slice]:
+    """Return the part of an image that some pixels are in, and those that their B-splines reach."""
+    top, bottom, left, right = rows.min(), rows.max(), columns.min(), columns.max()
+    margin = 2 * REACH
+    return (
+        slice(max(int(top) - margin, 0), int(bottom) + margin + 1),
+        slice(max(int(left) - margin, 0), int(right) + margin + 1),
+    )
+
+
+def _level(share: Floats, rows: Ints, columns: Ints, doubt: Floats, scale: int) -> Floats:
+    """Return a function at the cells of some pixels that is above a half on the share of each.
+
+    Args:
+        share: Shape (height, width).
+        rows: Of the pixels, shape (pixel,).
+        columns: Of the pixels, shape (pixel,).
+        doubt: How far off each share may be, shape (height, width).
+        scale: Cells along a pixel.
+
+    Returns:
+        Shape (pixel, scale, scale).
+    """
+    padded = np.pad(share, REACH, mode="edge")
+    wide, coefficients = padded.shape[1], padded.reshape(-1)
+    every = (rows + REACH) * wide + columns + REACH
+    some, goal, slack = every, share[rows, columns], doubt[rows, columns]
+    weights = _weights(max(scale, 2))
+    for _ in range(STEPS):
+        lack = goal - _covered(_sums(coefficients, wide, some, weights))
+        lack -= np.clip(lack, -slack, slack)
+        going = lack != 0
+        some, goal, slack = some[going], goal[going], slack[going]
+        coefficients[some] += RATE * lack[going]
+        for side in (padded, padded[::-1], padded.T, padded.T[::-1]):
+            for beyond in reversed(range(REACH)):  # what goes beyond the image goes straight on
+                side[beyond] = 2 * side[beyond + 1] - side[beyond + 2]
+    return np.moveaxis(_sums(coefficients, wide, every, _weights(scale)), 2, 0)
+
+
+def _weights(scale: int) -> Floats:
+    """Return the cubic B-splines of a pixel and its neighbours at its cells, along one side, (5, scale)."""
+    away = np.abs(np.arange(-REACH, REACH + 1)[:, None] - (np.arange(scale) + 0.5) / scale + 0.5)
+    rest = np.maximum(2 - away, 0)
+    near, far = 2 / 3 - away * away * (1 - away / 2), rest * rest * rest / 6
+    return np.where(away < 1, near, far).astype(np.float32)
+
+
+def _sums(coefficients: Floats, wide: int, some: Ints, weights: Floats) -> Floats:
+    """Return the sum of B-splines at the cells of some pixels, shape (scale, scale, pixel).
+
+    ``coefficients``: of an image ``wide`` pixels in width, where ``some`` are; shape (all of its pixels,).
+    """
+    scale = weights.shape[1]
+    total, across = np.zeros((scale, scale, len(some)), np.float32), np.empty((scale, len(some)), np.float32)
+    for down in range(-REACH, REACH + 1):
+        across[:] = 0
+        for right in range(-REACH, REACH + 1):
+            value = coefficients.take(some + (down * wide + right))
+            for i in np.flatnonzero(weights[REACH + right]).tolist():
+                across[i] += value * weights[REACH + right, i]
+        for i in np.flatnonzero(weights[REACH + down]).tolist():
+            total[i] += across * weights[REACH + down, i]
+    return total
+
+
+def _covered(values: Floats) -> Floats:
+    """Return the share of each pixel where a function is above a half; shape (pixel,).
+
+    ``values``: at its cells, shape (scale, scale, pixel); within a cell it is taken for linear.
+    """
+    down, right = np.gradient(values, axis=(0, 1))
+    slope = np.maximum(np.abs(down) + np.abs(right), GENTLEST / len(values))
+    return np.asarray(np.clip(0.5 + (values - 0.5) / slope, 0, 1).mean(axis=(0, 1)))

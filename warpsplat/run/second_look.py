@@ -1,0 +1,60 @@
+"""A second look at what an image was taken for, once there is a file: by how much of the image it shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from warpsplat.fit.export import finished
+from warpsplat.fit.problem import Fit, Problem
+from warpsplat.fit.settings import SUBJECTS, Subject, make_settings
+from warpsplat.metrics import psnr_of_file
+from warpsplat.portable.elementary import log10
+from warpsplat.portable.filters import resize_area, resize_linear
+from warpsplat.run.prepare import PreparedImage, choose_subject
+from warpsplat.scene import FloatArray
+
+NEXT: dict[Subject, Subject] = {"pixel": "drawing", "drawing": "photo"}
+"""What an image is taken for next, if it is not what its first file shows it as."""
+
+BYTES_PER_PIXEL = 4
+"""Bytes of a fit that shows as much as a pixel of a thumbnail, or more."""
+
+MUCH = 3.0
+"""How much farther from the image than that a file must be, for its subject to be the wrong one [dB]."""
+
+
+def other_subject(made: Fit, problem: Problem) -> Subject | None:
+    """Return another subject for an image of which a file shows much less than one of that size could.
+
+    A thumbnail stands for what shapes of any kind would show. None: the file shows enough.
+    """
+    settings, target = problem.settings, problem.target
+    other = NEXT.get(settings.subject)
+    asked = settings.counting or settings.is_limited or settings.paint or not settings.simplify
+    if other is None or made.interrupted or asked or settings.detail < make_settings().detail:
+        return None  # what was asked for may show little
+    text = finished(made.scene, settings, made.per_pixel)
+    height, width = target.shape[:2]
+    scale = math.sqrt(len(text.encode()) / (BYTES_PER_PIXEL * height * width))
+    if scale >= 1:
+        return None
+    size = max(1, int(scale * width)), max(1, int(scale * height))
+    return other if psnr_of_file(text, target) + MUCH < _thumbnail_psnr(target, size) else None
+
+
+def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
+    """Return an image that is taken for something else than before."""
+    problem, was = image.problem, image.problem.settings.subject
+    settings, _, notes = choose_subject(problem.target, replace(problem.settings, subject=subject))
+    why = f"as a {SUBJECTS[was]} it would show too little of the image"
+    return replace(image, problem=replace(problem, settings=settings), why=why, notes=(*image.notes, *notes))
+
+
+def _thumbnail_psnr(target: FloatArray, size: tuple[int, int]) -> float:
+    """Return the PSNR of an image made smaller and enlarged again; of one with opacity, as on black."""
+    small = resize_area(target, size)
+    error = float(np.square(resize_linear(small, target.shape[1::-1]) - target)[..., :3].mean())
+    return -10 * float(log10(max(error, 1e-10)))
