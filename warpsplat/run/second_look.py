@@ -17,7 +17,7 @@ from warpsplat.run.prepare import PreparedImage, choose_subject
 from warpsplat.scene import FloatArray
 
 NEXT: dict[Subject, Subject] = {"pixel": "drawing", "drawing": "photo"}
-"""What an image is taken for next, if it is not what its first file shows it as."""
+"""Subject that is tried next, by the one whose file shows too little."""
 
 BYTES_PER_PIXEL = 4
 """Bytes of a fit that shows as much as a pixel of a thumbnail, or more."""

@@ -78,7 +78,8 @@ def find_partition(regions: Regions) -> Partition:
     painted[cells], runner_up, lead[cells] = _leading(shares, rows, columns, scale)
     doubtful = _doubtful(painted, cells, shares.doubt[rows, columns], scale)
     painted[cells] = np.where(doubtful, runner_up, painted[cells])
-    fills = shares.colors.at(painted, *(each // scale for each in np.indices(painted.shape, np.int32)))
+    down, right = np.ogrid[: painted.shape[0], : painted.shape[1]]
+    fills = shares.colors.at(painted, *np.broadcast_arrays(down // scale, right // scale))
     labels = components(painted, fills)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = painted
@@ -123,12 +124,12 @@ def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Int
     index = np.full(shares.share.shape, -1, np.intp)
     index[rows, columns] = np.arange(len(rows))
     for k in numbers:
-        own = (one == k) | (other == k)
-        box = _around(rows[own], columns[own])
         if len(numbers) == 2:  # one is where the other is not
             values = _level(shares.of(k, np.s_[:, :]), rows, columns, shares.doubt, scale)
             is_first = values >= 0.5
             return np.where(is_first, *numbers), np.where(is_first, *numbers[::-1]), np.abs(2 * values - 1)
+        own = (one == k) | (other == k)
+        box = _around(rows[own], columns[own])
         share, number = shares.of(k, box), index[box]
         near_rows, near_columns = np.nonzero(dilated(share > 0, 3) & (number >= 0))
         some = number[near_rows, near_columns]

@@ -1,4 +1,4 @@
-"""What the pixels of an image are made of: a colouring each, or two of them in known shares."""
+"""Shares of colourings in the pixels of an image: each is of one colouring, or a mixture of two."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROUNDING = 1.0
 """How far a pixel of one colour is off, besides noise [levels]; more tells where faint borders lie."""
 
 DOUBT = 3.0
-"""How far off a share may be, over what its mixture leaves unexplained: what is usual, three times."""
+"""How far off a share may be, over what its residual and noise make it: outliers are three times as far."""
 
 PURE = 0.02
 """Share of another colouring up to which a pixel is not mixed."""
@@ -31,7 +31,7 @@ class Colors:
     """Colours of colourings in the pixels of an image."""
 
     mean: Floats
-    """Of each colouring, shape (colouring, 4)."""
+    """Mean colour of each colouring, shape (colouring, 4)."""
     ramps: dict[int, Floats]
     """Gradients, shape (height, width, 4): outside their own pixels the colour of the nearest one."""
 
@@ -66,7 +66,7 @@ class Shares:
     doubt: Floats
     """How far off that may be, 0 to 1/2."""
     colors: Colors
-    """What the colourings look like."""
+    """Colours of the colourings."""
 
     def of(self, number: int, where: tuple[slice, slice]) -> Floats:
         """Return the share of a colouring in the pixels of a part of the image."""
