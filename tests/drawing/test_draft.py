@@ -54,7 +54,7 @@ def test_figures_that_only_a_fit_has_are_left_out() -> None:
 
 def test_few_bytes_and_few_colours() -> None:
     whole = draft(draw(LOGO), subject="drawing")
-    most = scored(whole).bytes - 100
+    most = scored(whole).bytes - 60
     small = draft(draw(LOGO), subject="drawing", max_bytes=most)
     assert len(whole.scene) > len(small.scene) > 1
     assert scored(small).bytes <= most

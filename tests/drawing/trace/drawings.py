@@ -22,9 +22,11 @@ def star(x: float, y: float, outer: float, inner: float, tips: int = 5) -> str:
     )
 
 
+STAR = star(46, 42, 30, 12)
+
 LOGO = (
     '<rect x="5" y="5" width="86" height="86" rx="20" fill="#2457a8"/>'
-    f'<polygon points="{star(46, 42, 30, 12)}" fill="#ffd23f"/>'
+    f'<polygon points="{STAR}" fill="#ffd23f"/>'
     '<circle cx="75" cy="73" r="9" fill="#ee4266"/>'
     '<rect x="18" y="68" width="28" height="11" fill="#ffffff"/>'
 )

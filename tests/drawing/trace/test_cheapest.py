@@ -9,8 +9,8 @@ from warpsplat.drawing.trace.spans import Polyline, cut_at_corners
 
 
 def chain(points: np.ndarray, tolerance: float = 0.2) -> CurvePieces:
-    spans = cut_at_corners([Polyline(points[1:-1], False, points[0], points[-1])], tolerance)
-    return cheapest_chains(spans, tolerance)
+    spans = cut_at_corners([Polyline(points[1:-1], False, points[0], points[-1])], [tolerance])
+    return cheapest_chains(spans, np.full(len(spans.owner), tolerance))
 
 
 def test_one_line_one_cubic_or_several() -> None:

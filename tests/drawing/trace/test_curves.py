@@ -39,13 +39,13 @@ def sampled(cubics: Floats, count: int = 40) -> Floats:
 
 
 def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
-    (pieces,) = fit_polylines([Polyline(points, closed=True)], tolerance)
+    (pieces,) = fit_polylines([Polyline(points, closed=True)], [tolerance])
     assert np.allclose(pieces.cubics[:, 3], np.roll(pieces.cubics[:, 0], -1, axis=0), atol=1e-6), "no gaps"
     return pieces
 
 
 def count_corners(points: Floats) -> int:
-    return len(find_corners(Polylines.joined([points], [True])).along)
+    return len(find_corners(Polylines.joined([points], [True]), np.ones(1)).along)
 
 
 @pytest.mark.parametrize("radius", [3.0, 12.0, 40.0])
@@ -112,7 +112,7 @@ def test_open_runs_end_where_they_are_told_to() -> None:
     x = np.arange(1.0, 40)
     points = np.stack([x, 10 * np.sin(x / 12)], axis=1)
     start, end = np.array([0.0, 0.0]), np.array([40.0, 10 * np.sin(40 / 12)])
-    (pieces,) = fit_polylines([Polyline(points, False, start, end)], 0.2)
+    (pieces,) = fit_polylines([Polyline(points, False, start, end)], [0.2])
     assert np.allclose(pieces.cubics[0, 0], start) and np.allclose(pieces.cubics[-1, 3], end)
     assert len(pieces.cubics) <= 3
     shown = sampled(pieces.cubics, 200)
@@ -126,6 +126,6 @@ def test_many_runs_are_fitted_as_each_alone() -> None:
     for count in (2, 9, 60):
         points = np.cumsum(rng.normal(0, 1, (count, 2)), axis=0)
         runs += [Polyline(points[1:-1], False, points[0], points[-1]), Polyline(points, closed=True)]
-    for alone, run in zip(fit_polylines(runs, 0.2), runs, strict=True):
-        (pieces,) = fit_polylines([run], 0.2)
+    for alone, run in zip(fit_polylines(runs, [0.2] * len(runs)), runs, strict=True):
+        (pieces,) = fit_polylines([run], [0.2])
         assert np.allclose(pieces.cubics, alone.cubics, atol=1e-9) and (pieces.lines == alone.lines).all()

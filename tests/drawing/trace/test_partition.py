@@ -82,8 +82,8 @@ def test_hard_edges_of_slanted_outlines_are_steps_that_are_not_followed() -> Non
     inside = ground("#ffffff", 48, 48) + '<path d="M4 10L44 17V40H4z" fill="#a02030"/>'
     hard = find_partition(find_regions(levels(draw(inside, 48, 48, hard=True))))
     soft = find_partition(find_regions(levels(draw_exactly(inside, 48, 48))))
-    assert hard.doubt == 0.5 and hard.scale == 1
-    assert soft.doubt < 0.01 and soft.scale == 4
+    assert hard.doubt.max() == 0.5 and hard.scale == 1
+    assert soft.doubt.max() < 0.02 and soft.scale == 4
 
 
 def test_noise_makes_boundaries_doubtful_and_cells_coarse() -> None:
@@ -95,7 +95,7 @@ def test_noise_makes_boundaries_doubtful_and_cells_coarse() -> None:
     noisy = replace(
         regions, image=np.where(image == regions.fills, image, np.clip(image + noise, 0, 255)), noise=8.0
     )
-    assert find_partition(noisy).doubt > 10 * find_partition(regions).doubt
+    assert find_partition(noisy).doubt.mean() > 10 * find_partition(regions).doubt.mean()
     assert find_partition(noisy).scale < find_partition(regions).scale
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from tests.drawing.trace.drawings import LOGO, STAR, draw, ground, photograph
 from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import find_partition
@@ -38,8 +38,11 @@ def test_a_logo() -> None:
     assert (traced.scene.opacities == 1).all()
     assert decibels(traced, image) > 39
     star = hex_colors(traced).index("ffd23f")
-    kinds = traced.joints[traced.scene.first[star] : traced.scene.first[star + 1]]
-    assert (kinds == Joint.CORNER).sum() == 10
+    points = slice(traced.scene.first[star], traced.scene.first[star + 1])
+    corners = traced.scene.points[points][traced.joints[points] == Joint.CORNER]
+    tips = np.array([point.split(",") for point in STAR.split()], np.float64)
+    assert np.hypot(*(tips[:, None] - corners).transpose(2, 0, 1)).min(axis=1).max() < 0.4
+    assert len(corners) <= 12, "viewers' antialiasing is coarse: sides are a little uneven"
     disc = hex_colors(traced).index("ee4266")
     assert traced.scene.point_counts()[disc] == 12
     assert on_outline(traced).sum() * 3 == len(traced.scene.points)

@@ -17,6 +17,7 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
+DOUBT = np.ones((1, 1), np.float32)  # how far off centre lines are at corners, anywhere [px]
 TOLERANCE = 0.45  # [px] largest distance of a centre line from its curve
 THINNEST, LONG = 0.3, 6.0
 """Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
@@ -62,7 +63,7 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
     found = find_lines(ink, mixed=mixed, only_lines=only_lines)
     strokes = [stroke for line in found.lines for stroke in _strokes(line, thin=not ink.textured)]
     strokes.sort(key=lambda stroke: stroke.pen)
-    fitted = fit_polylines([stroke.polyline() for stroke in strokes], TOLERANCE)
+    fitted = fit_polylines([stroke.polyline() for stroke in strokes], [TOLERANCE] * len(strokes), DOUBT)
     height, width = ink.mask.shape
     scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, found.pens)
     return TracedLines(scene, found.pens, found.areas, found.area_pens)

@@ -50,7 +50,7 @@ class CurvePieces:
         )
 
 
-def cheapest_chains(spans: Spans, tolerance: float) -> CurvePieces:
+def cheapest_chains(spans: Spans, tolerances: Floats) -> CurvePieces:
     """Return the pieces of the cheapest chain of each span, in order.
 
     Of a long span a few knots are tried first; where no curve from one to the next is near enough, those
@@ -58,17 +58,17 @@ def cheapest_chains(spans: Spans, tolerance: float) -> CurvePieces:
 
     Args:
         spans: Not empty.
-        tolerance: Largest distance of a point from its curve [px].
+        tolerances: Largest distance of a point of each from its curve [px], shape (span,).
     """
     index, first = _few(spans.first)
-    chains = _chains(spans.at(index, first), tolerance)
+    chains = _chains(spans.at(index, first), tolerances)
     owner = np.searchsorted(first, chains.begin, "right") - 1
     chains = replace(chains, span=owner, begin=index[chains.begin], end=index[chains.end])
     far = ~np.isfinite(chains.costs) & (chains.end > chains.begin + 1)
     if far.any():
         begin, counts = chains.begin[far], (chains.end - chains.begin)[far] + 1
         inner = ranges(begin, counts)
-        parts = cheapest_chains(spans.at(inner, starts_of(counts)), tolerance)
+        parts = cheapest_chains(spans.at(inner, starts_of(counts)), tolerances[owner[far]])
         parts = replace(parts, span=owner[far][parts.span], begin=inner[parts.begin], end=inner[parts.end])
         chains = CurvePieces.joined([chains.take(~far), parts])
     return chains.take(np.lexsort((chains.begin, chains.span)))
@@ -82,7 +82,7 @@ def _few(first: Ints) -> tuple[Ints, Ints]:
     return first[owner] + number * steps[owner] // (counts[owner] - 1), starts_of(counts)
 
 
-def _chains(spans: Spans, tolerance: float) -> CurvePieces:
+def _chains(spans: Spans, tolerances: Floats) -> CurvePieces:
     """Return cheapest chains as ``cheapest_chains``, of spans with few knots.
 
     A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
@@ -90,13 +90,13 @@ def _chains(spans: Spans, tolerance: float) -> CurvePieces:
     """
     first, last = spans.first[:-1], spans.first[1:] - 1
     number = np.arange(len(first))
-    whole = _candidates(spans, number, first, last, tolerance)
+    whole = _candidates(spans, number, first, last, tolerances)
     is_enough = np.isfinite(whole.costs) | (last == first + 1)
     rest = number[~is_enough]
     inner = last[rest] - first[rest] - 1
     owner, middle = np.repeat(rest, inner), ranges(first[rest] + 1, inner)
-    heads = _candidates(spans, owner, first[owner], middle, tolerance)
-    tails = _candidates(spans, owner, middle, last[owner], tolerance)
+    heads = _candidates(spans, owner, first[owner], middle, tolerances)
+    tails = _candidates(spans, owner, middle, last[owner], tolerances)
     both = heads.costs + tails.costs
     order = np.lexsort((both, owner))
     best = order[np.append(True, np.diff(owner[order]) != 0)[: len(order)]]
@@ -105,12 +105,12 @@ def _chains(spans: Spans, tolerance: float) -> CurvePieces:
     found = [whole.take(is_enough), heads.take(best), tails.take(best)]
     pairs = np.cumsum((last - first)[rest] ** 2)
     for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):
-        found.append(_cheapest(spans, group, tolerance))
+        found.append(_cheapest(spans, group, tolerances))
     chains = CurvePieces.joined(found)
     return chains.take(np.argsort(chains.begin, kind="stable"))
 
 
-def _cheapest(spans: Spans, group: Ints, tolerance: float) -> CurvePieces:
+def _cheapest(spans: Spans, group: Ints, tolerances: Floats) -> CurvePieces:
     """Return the cheapest chains of some spans, by dynamic programming over pairs of knots."""
     first, last = spans.first[group], spans.first[group + 1] - 1
     number, begin, end = _pairs(last - first + 1)
@@ -119,12 +119,12 @@ def _cheapest(spans: Spans, group: Ints, tolerance: float) -> CurvePieces:
     coarse, low, high = _pairs(steps)
     near = np.ones((len(group), *2 * (int(steps.max(initial=1)),)), np.bool_)
     knots = first[coarse] + STRIDE * low, first[coarse] + STRIDE * high
-    near[coarse, low, high] = np.isfinite(_candidates(spans, group[coarse], *knots, FAR * tolerance).costs)
+    near[coarse, low, high] = np.isfinite(_candidates(spans, group[coarse], *knots, FAR * tolerances).costs)
     inner = -(-begin // STRIDE), end // STRIDE
     tried = np.flatnonzero((inner[1] <= inner[0]) | near[number, np.minimum(inner[0], inner[1]), inner[1]])
     number, level = number[tried], begin[tried]
     begin, end = first[number] + level, first[number] + end[tried]
-    pieces = _candidates(spans, group[number], begin, end, tolerance)
+    pieces = _candidates(spans, group[number], begin, end, tolerances)
     # A curve may go to the next knot, whatever its error.
     costs = np.where((end == begin + 1) & ~np.isfinite(pieces.costs), FORCED_COST, pieces.costs)
     best, back = np.full(len(spans.knots), np.inf), np.zeros(len(spans.knots), np.intp)
@@ -149,13 +149,13 @@ def _pairs(counts: Ints) -> tuple[Ints, Ints, Ints]:
     return np.repeat(owner, after), np.repeat(low, after), ranges(low + 1, after)
 
 
-def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> CurvePieces:
+def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) -> CurvePieces:
     """Return candidates between knots, shape (candidate,) each."""
     parts = [slice(low, low + CHUNK) for low in range(0, max(len(span), 1), CHUNK)]
-    return CurvePieces.joined([_some(spans, span[i], begin[i], end[i], tolerance) for i in parts])
+    return CurvePieces.joined([_some(spans, span[i], begin[i], end[i], tolerances) for i in parts])
 
 
-def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) -> CurvePieces:
+def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) -> CurvePieces:
     """Return candidates as ``_candidates``, not so many."""
     low, high = spans.places[begin], spans.places[end]
     where = low + (high - low) * np.linspace(0, 1, SAMPLES)[:, None]
@@ -168,6 +168,7 @@ def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) ->
     )
     # Towards a knot its own place counts, not the noisy point there.
     x[0], y[0], (x[-1], y[-1]) = 0, 0, (goal - start).T
+    tolerance = tolerances[span]
     costs = _costs(_line_errors(x, y), LINE_COST, tolerance)
     is_line = np.isfinite(costs)
     cubics = np.stack([start, start, goal, goal], axis=1)
@@ -177,11 +178,11 @@ def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerance: float) ->
     handles, errors = fit_handles(ahead.T, back.T, x[:, bent], y[:, bent])
     cubics[bent, 1] += handles[0][:, None] * ahead
     cubics[bent, 2] += handles[1][:, None] * back
-    costs[bent] = _costs(errors, CUBIC_COST, tolerance)
+    costs[bent] = _costs(errors, CUBIC_COST, tolerance[bent])
     return CurvePieces(span, begin, end, cubics, is_line, costs)
 
 
-def _costs(errors: Floats, base: float, tolerance: float) -> Floats:
+def _costs(errors: Floats, base: float, tolerance: Floats) -> Floats:
     return np.where(errors <= tolerance, base + ERROR_COST * (errors / tolerance) ** 2, np.inf)
 
 

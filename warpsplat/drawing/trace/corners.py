@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,13 +23,18 @@ LEAST_REACH = 1.2  # [px] of outline on each side, below which nothing is compar
 LEAST_POINTS = 5  # of a polyline with corners
 APART = 2.0  # [px] of outline between two corners, at the least
 
-ROUNDED = 1.1  # [px] of outline on each side of a corner that its antialiasing bends
-SIDE = 6.0  # [px] of outline on each side that tells where a corner is
+BENT = 2.0, 1.0
+"""Lengths of outline on each side of a corner that its antialiasing may bend [px]."""
+
+SIDES = 5.0, 2.0
+"""Lengths of outline beside these that may tell where the corner lies [px]."""
+
 SIDE_SAMPLES = 9  # points of a side that tell its direction
-LEAST_SIDE = 1.5  # [px] of outline that has a direction
-MOST_OFF, MOST_OFF_SHORT = 4.0, 1.2  # [px] of a corner with long and short sides: the tips of stars are off
+LEAST_SIDE = 0.5  # [px] of outline that has a direction
+MOST_OFF = 4.0  # [px] of a corner from its outline: the tips of stars are off
+MOST_AREA = 0.18  # of a pixel that a corner and its outline differ by; logos: nothing changes from 0.1 to 0.2
+SAMPLES = 17  # points of an outline beside a corner that tell these areas
 BLUNT = 3.5  # [px] of outline between two corners that may be one
-MOST_OFF_BLUNT = 3.0  # [px] distance of that one from their middle, at the most
 
 
 @dataclass(frozen=True)
@@ -41,18 +47,21 @@ class Corners:
     """The arc length where it lies, shape (corner,)."""
     points: Floats
     """Its point, shape (corner, 2)."""
+    bent: Floats
+    """The length of outline on each side that is not part of its sides, shape (corner,)."""
 
 
-def find_corners(lines: Polylines, scale: float = 1.0) -> Corners:
+def find_corners(lines: Polylines, scales: Floats, doubt: Floats | None = None) -> Corners:
     """Return the corners of polylines.
 
     Args:
         lines: Of sub-pixel points.
-        scale: Factor of the lengths that are compared; larger for coarser outlines.
+        scales: Factor of the lengths that are compared, larger for coarser outlines; shape (polyline,).
+        doubt: How far off areas of pixels may be, shape (height, width); None: not at all.
     """
     strength = np.zeros(len(lines.points))
     for length, least in SCALES:
-        reach = np.minimum(length * scale, lines.totals / 6)
+        reach = np.minimum(length * scales, lines.totals / 6)
         compared = np.flatnonzero((reach >= LEAST_REACH) & (lines.counts >= LEAST_POINTS))
         which = np.repeat(compared, lines.counts[compared])
         index = ranges(lines.first[compared], lines.counts[compared])
@@ -64,7 +73,7 @@ def find_corners(lines: Polylines, scale: float = 1.0) -> Corners:
         at_end = (here < reach * 0.6) | (here > lines.totals[which] - reach * 0.6)
         excess[at_end & ~lines.closed[which]] = 0
         strength[index] = np.maximum(strength[index], excess / least)
-    return _with_sharp_tips(lines, _located(lines, _peaks(lines, strength)))
+    return _located(lines, _peaks(lines, strength), BLUNT * scales, doubt)
 
 
 def _turns(lines: Polylines, which: Ints, where: Floats, reach: Floats) -> Floats:
@@ -98,25 +107,131 @@ def _peaks(lines: Polylines, strength: Floats) -> Ints:
     return np.asarray(sorted(found), np.intp)
 
 
-def _located(lines: Polylines, peaks: Ints) -> Corners:
-    """Return corners where their two sides meet."""
+def _located(lines: Polylines, peaks: Ints, blunt: Floats, doubt: Floats | None) -> Corners:
+    """Return corners at peaks where the pixels keep their areas.
+
+    Antialiasing may have made two peaks of a corner: two nearer than ``blunt`` are one if they may be.
+    """
     owner, here = np.searchsorted(lines.first, peaks, side="right") - 1, lines.along[peaks]
     total, closed = lines.totals[owner], lines.closed[owner]
-    before, after = _neighbours(owner)
-    # Before the first corner of a closed polyline lies the last, and beyond an open one nothing.
-    beyond = np.where(closed, here[before] - total, -ROUNDED)
-    low = np.where(before < np.arange(len(peaks)), here[before], beyond)
-    beyond = np.where(closed, here[after] + total, total + ROUNDED)
-    high = np.where(after > np.arange(len(peaks)), here[after], beyond)
-    low, high = np.maximum(here - SIDE, low + ROUNDED), np.minimum(here + SIDE, high - ROUNDED)
-    is_long = np.minimum(here - low, high - here) > 0.6 * SIDE
-    points, _ = _meetings(
-        _sides(lines, owner, low, here - ROUNDED),
-        _sides(lines, owner, here + ROUNDED, high),
-        lines.points[peaks],
-        np.where(is_long, MOST_OFF, MOST_OFF_SHORT),
-    )
-    return Corners(owner, here, points)
+    after = _neighbours(owner)[1]
+    wraps = after <= np.arange(len(peaks))
+    following = here[after] + np.where(wraps, total, 0)
+    near = (following - here < blunt[owner]) & (following > here)
+    pairs = np.flatnonzero(near & (closed | ~wraps))
+    other = after[pairs]
+    which = np.append(owner, owner[pairs])
+    first, last = np.append(here, here[pairs]), np.append(here, following[pairs])
+    points, off, bent = _meeting(lines, which, first, last, doubt)
+    bent += (last - first) / 2
+    kept = off <= MOST_AREA
+    joined = np.flatnonzero(kept[len(peaks) :]) + len(peaks)
+    free = np.ones(len(peaks), np.bool_)
+    for pair in joined[np.argsort(off[joined], kind="stable")].tolist():
+        both = [pairs[pair - len(peaks)], other[pair - len(peaks)]]
+        kept[pair] = free[both].all()
+        if kept[pair]:
+            kept[both], free[both] = False, False
+    along = (first + last) / 2
+    along = np.where(lines.closed[which], along % np.maximum(lines.totals[which], 1e-9), along)
+    order = np.lexsort((along, which))
+    order = order[kept[order]]
+    near = hypot(*np.diff(points[order], axis=0).T) < APART / 2
+    order = order[np.append(True, ~near | (np.diff(which[order]) != 0))[: len(order)]]
+    return Corners(which[order], along[order], points[order], bent[order])
+
+
+def _at(values: Floats, points: Floats) -> Floats:
+    """Return the largest of the values (height, width) of the pixels around points, shape (point,)."""
+    height, width = values.shape
+    x, y = np.floor(points).astype(np.intp).T
+    around = [(y + down, x + right) for down in (-1, 0, 1) for right in (-1, 0, 1)]
+    inside = [(row.clip(0, height - 1), column.clip(0, width - 1)) for row, column in around]
+    return np.asarray(np.max([values[place] for place in inside], axis=0))
+
+
+def _meeting(
+    lines: Polylines, owner: Ints, first: Floats, last: Floats, doubt: Floats | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return where the sides of corners meet, how much the area of a pixel changes then, and what is bent.
+
+    Which part of its outline antialiasing has bent, and how long its sides are straight, is tried.
+
+    Args:
+        lines: Of sub-pixel points.
+        owner: The polyline of each corner, shape (corner,).
+        first: The arc length where it begins, shape (corner,).
+        last: The arc length where it ends, shape (corner,).
+        doubt: As for ``find_corners``.
+
+    Returns:
+        Points, shape (corner, 2); the largest area beyond doubt [px^2], infinite where no sides meet; the
+        length of outline on each side that is bent; shape (corner,) each.
+    """
+    middle, total, closed = (first + last) / 2, lines.totals[owner], lines.closed[owner]
+    # Nothing lies beyond the ends of an open polyline, and beyond half a closed one the other side.
+    low, high = np.where(closed, middle - total / 2, 0), np.where(closed, middle + total / 2, total)
+    best = np.full(len(owner), np.inf)
+    near = lines.at(owner, middle)
+    bend = np.full(len(owner), BENT[-1])
+    points, slack = near.copy(), np.zeros(len(owner)) if doubt is None else _at(doubt, near)
+    for side, bent in itertools.product(SIDES, BENT):
+        begin, end = np.maximum(first - bent, (low + first) / 2), np.minimum(last + bent, (last + high) / 2)
+        tips, met = _meetings(
+            _sides(lines, owner, np.maximum(begin - side, low), begin),
+            _sides(lines, owner, end, np.minimum(end + side, high)),
+            near,
+        )
+        where = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, SAMPLES)
+        outline = lines.at(np.repeat(owner, SAMPLES), where.reshape(-1)).reshape(-1, SAMPLES, 2)
+        tips = _with_area(outline, tips, slack)
+        off = np.where(met, np.maximum(_most_changed(outline, tips) - slack, 0), np.inf)
+        better = off < best
+        best[better], points[better], bend[better] = off[better], tips[better], bent
+    return points, best, bend
+
+
+def _with_area(outlines: Floats, tips: Floats, slack: Floats) -> Floats:
+    """Return tips so far out that going straight to them and back covers about the area of outlines.
+
+    Args:
+        outlines: Shape (corner, point, 2).
+        tips: Shape (corner, 2).
+        slack: By how much they may differ, shape (corner,).
+    """
+    x, y = np.moveaxis(outlines, 2, 0)
+    area = (x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1) + x[:, -1] * y[:, 0] - x[:, 0] * y[:, -1]
+    chord, ahead = outlines[:, -1] - outlines[:, 0], tips - (outlines[:, 0] + outlines[:, -1]) / 2
+    now = ahead[:, 0] * chord[:, 1] - ahead[:, 1] * chord[:, 0]
+    lack = area - now
+    lack -= np.clip(lack, -2 * slack, 2 * slack)
+    factor = np.clip(lack / np.where(now == 0, np.inf, now), -0.5, 0.5)
+    return np.asarray(tips + factor[:, None] * ahead)
+
+
+def _most_changed(outlines: Floats, tips: Floats) -> Floats:
+    """Return by how much areas of pixels change if outlines go straight to tips and back; shape (corner,).
+
+    Args:
+        outlines: Of close points, shape (corner, point, 2).
+        tips: Shape (corner, 2).
+
+    Returns:
+        The largest change [px^2].
+    """
+    shares = np.linspace(0, 1, SAMPLES)[1:, None]
+    ends, starts, tips = outlines[:, -1:], outlines[:, :1], tips[:, None]
+    rings = np.concatenate([outlines, ends + (tips - ends) * shares, tips + (starts - tips) * shares], axis=1)
+    middles, down = (rings[:, 1:] + rings[:, :-1]) / 2, np.diff(rings[..., 1], axis=1)
+    cells = np.floor(middles).astype(np.intp)
+    right = middles[..., 0] - cells[..., 0]
+    cells -= cells.min(axis=1, keepdims=True)
+    width, height = cells.reshape(-1, 2).max(axis=0, initial=0) + 2
+    at = ((np.arange(len(rings))[:, None] * height + cells[..., 1]) * width + cells[..., 0]).reshape(-1)
+    # Of each step down or up, a part of its own pixel lies to the right of it, and all of those beyond.
+    steps = np.bincount(at, (down * (1 - right)).reshape(-1), len(rings) * height * width)
+    steps += np.bincount(at + 1, (down * right).reshape(-1), len(steps))
+    return np.abs(steps.reshape(-1, height, width).cumsum(axis=2)).max(axis=(1, 2), initial=0)
 
 
 def _neighbours(owner: Ints) -> tuple[Ints, Ints]:
@@ -126,48 +241,6 @@ def _neighbours(owner: Ints) -> tuple[Ints, Ints]:
     before, after = number - 1, number + 1
     before[is_first], after[is_last] = number[is_last], number[is_first]
     return before, after
-
-
-def _with_sharp_tips(lines: Polylines, corners: Corners) -> Corners:
-    """Return corners with one for each two that antialiasing made of it: their outer sides meet near them."""
-    while len(corners.owner):
-        owner, along, points = corners.owner, corners.along.copy(), corners.points.copy()
-        after = _neighbours(owner)[1]
-        wraps = after <= np.arange(len(owner))
-        total, closed = lines.totals[owner], lines.closed[owner]
-        left = np.bincount(owner)
-        near = (along[after] + wraps * total - along < BLUNT) & (closed | ~wraps) & (left[owner] > 2)
-        pairs = np.flatnonzero(near)
-        low, high = along[pairs], along[after[pairs]] + (wraps * total)[pairs]
-        met, middle, tips = _tips(lines, owner[pairs], low, high)
-        gone, taken = np.zeros(len(owner), np.bool_), np.zeros(len(owner), np.bool_)
-        for number in np.flatnonzero(met).tolist():
-            one, other = int(pairs[number]), int(after[pairs[number]])
-            if not (taken[one] or taken[other] or left[owner[one]] <= 2):
-                taken[[one, other]], gone[other] = True, True
-                along[one], points[one] = middle[number], tips[number]
-                left[owner[one]] -= 1
-        if not gone.any():
-            break
-        order = np.lexsort((along, owner))
-        order = order[~gone[order]]
-        corners = Corners(owner[order], along[order], points[order])
-    return corners
-
-
-def _tips(lines: Polylines, owner: Ints, low: Floats, high: Floats) -> tuple[Bools, Floats, Floats]:
-    """Return whether what is outside of two corners meets near their middle, that arc length, and where."""
-    total, closed = lines.totals[owner], lines.closed[owner]
-    before = np.where(closed, low - SIDE, np.maximum(low - SIDE, 0))
-    beyond = np.where(closed, high + SIDE, np.minimum(high + SIDE, total))
-    middle = (low + high) / 2
-    points, met = _meetings(
-        _sides(lines, owner, before, low - 0.5),
-        _sides(lines, owner, high + 0.5, beyond),
-        lines.at(owner, middle),
-        np.full(len(owner), MOST_OFF_BLUNT),
-    )
-    return met, np.where(closed, middle % np.where(closed, total, 1), middle), points
 
 
 @dataclass(frozen=True)
@@ -189,14 +262,13 @@ def _sides(lines: Polylines, owner: Ints, low: Floats, high: Floats) -> _Sides:
     return _Sides(points.mean(axis=1), principal_direction(points), high - low >= LEAST_SIDE)
 
 
-def _meetings(one: _Sides, other: _Sides, near: Floats, far: Floats) -> tuple[Floats, Bools]:
-    """Return where sides meet, and whether they do; ``near`` where not, or farther away from it than ``far``.
+def _meetings(one: _Sides, other: _Sides, near: Floats) -> tuple[Floats, Bools]:
+    """Return where sides meet, ``near`` where they do not, and whether they do.
 
     Args:
         one: Sides before corners.
         other: Those after.
         near: Shape (corner, 2).
-        far: [px], shape (corner,).
     """
     (x, y), (other_x, other_y) = one.directions.T, other.directions.T
     away_x, away_y = (other.middles - one.middles).T
@@ -204,5 +276,5 @@ def _meetings(one: _Sides, other: _Sides, near: Floats, far: Floats) -> tuple[Fl
     met = one.known & other.known & (np.abs(cross) >= 0.2)
     along = (away_x * other_y - away_y * other_x) / np.where(met, cross, 1)
     points = one.middles + along[:, None] * one.directions
-    met &= hypot(*(points - near).T) <= far
+    met &= hypot(*(points - near).T) <= MOST_OFF
     return np.where(met[:, None], points, near), met

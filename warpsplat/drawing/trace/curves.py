@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,29 +30,33 @@ class Pieces:
     """Which are straight, shape (piece,)."""
 
 
-def fit_polylines(runs: list[Polyline], tolerance: float) -> list[Pieces]:
+def fit_polylines(
+    runs: list[Polyline], tolerances: Sequence[float], doubt: Floats | None = None
+) -> list[Pieces]:
     """Return lines and cubics for each run.
 
     Args:
         runs: Parts of outlines.
-        tolerance: Largest distance of a point from its curve [px].
+        tolerances: Largest distance of a point of each from its curve [px].
+        doubt: As for ``find_corners``.
     """
     found: list[Pieces | None] = [_polygon(run) for run in runs]
     rings = [i for i, run in enumerate(runs) if run.closed and not run.is_polygon]
-    for number, circle in fit_circles([runs[ring].points for ring in rings], tolerance).items():
+    most = [tolerances[ring] for ring in rings]
+    for number, circle in fit_circles([runs[ring].points for ring in rings], most).items():
         found[rings[number]] = Pieces(circle, np.zeros(4, np.bool_))
     rest = [i for i, pieces in enumerate(found) if pieces is None]
     if rest:
-        curves = _fitted([runs[i] for i in rest], tolerance)
+        curves = _fitted([runs[i] for i in rest], [tolerances[i] for i in rest], doubt)
         for i, pieces in zip(rest, curves, strict=True):
-            found[i] = _with_level_lines(pieces, runs[i].closed, tolerance)
+            found[i] = _with_level_lines(pieces, runs[i].closed, tolerances[i])
     return [pieces for pieces in found if pieces is not None]
 
 
-def fit_circles(rings: list[Floats], tolerance: float) -> dict[int, Floats]:
+def fit_circles(rings: list[Floats], tolerances: Sequence[float]) -> dict[int, Floats]:
     """Return the four cubics of each closed outline (point, 2) that is a circle, by its number.
 
-    ``tolerance``: how far points may be from it [px].
+    ``tolerances``: how far points of each may be from it [px].
     """
     lines, which = Polylines.joined(rings, [True] * len(rings)), np.repeat(np.arange(len(rings)), AROUND)
     places = lines.totals[which] * np.tile(np.arange(AROUND) / AROUND, len(rings))
@@ -59,7 +64,7 @@ def fit_circles(rings: list[Floats], tolerance: float) -> dict[int, Floats]:
     center = points.mean(axis=1)
     away = hypot(*(points - center[:, None]).transpose(2, 0, 1))
     radius = away.mean(axis=1)
-    near = np.flatnonzero(np.abs(away - radius[:, None]).max(axis=1) <= tolerance).tolist()
+    near = np.flatnonzero(np.abs(away - radius[:, None]).max(axis=1) <= np.asarray(tolerances)).tolist()
     made = {i: center[i] + radius[i] * QUARTERS for i in near}
     return {
         i: made[i] if area > 0 else made[i][::-1, ::-1]
@@ -86,10 +91,10 @@ def _polygon(run: Polyline) -> Pieces | None:
     return Pieces(cubics, np.ones(len(cubics), np.bool_))
 
 
-def _fitted(runs: list[Polyline], tolerance: float) -> list[Pieces]:
+def _fitted(runs: list[Polyline], tolerances: list[float], doubt: Floats | None) -> list[Pieces]:
     """Return the cheapest lines and cubics for each run, no polygons."""
-    spans = cut_at_corners(runs, tolerance)
-    chains = cheapest_chains(spans, tolerance)
+    spans = cut_at_corners(runs, tolerances, doubt)
+    chains = cheapest_chains(spans, np.asarray(tolerances)[spans.owner])
     owner = spans.owner[chains.span]
     order = np.argsort(owner, kind="stable")
     lines, curves = chains.is_line[order], chains.cubics[order]

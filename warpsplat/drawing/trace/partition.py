@@ -56,8 +56,8 @@ class Partition:
     colorings: list[Coloring]
     scale: int
     """Cells along a pixel."""
-    doubt: float
-    """How far off shares of pixels at boundaries are, and so the boundaries [px]."""
+    doubt: Floats
+    """How far off the shares of pixels may be, and so the boundaries in them [px], shape (height, width)."""
 
 
 def find_partition(regions: Regions) -> Partition:
@@ -65,7 +65,7 @@ def find_partition(regions: Regions) -> Partition:
     regions = with_inks(regions)
     shares = find_shares(regions)
     at_border = beside_borders(shares.first) | (shares.share < 1)
-    doubt = float(shares.doubt[at_border].mean()) if at_border.any() else 0.0
+    doubt = _usual(shares, at_border)
     pixels = regions.labels.size
     scale = next((s for s in SCALES if s * s * pixels <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
     # A border between pixels that are surely of one colouring each is exactly there.
@@ -83,7 +83,14 @@ def find_partition(regions: Regions) -> Partition:
     labels = components(painted, fills)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = painted
-    return Partition(labels, fills, lead, paint, regions.colorings, scale, doubt)
+    return Partition(labels, fills, lead, paint, regions.colorings, scale, shares.doubt)
+
+
+def _usual(shares: Shares, at_border: Bools) -> float:
+    """Return the usual doubt of mixed pixels or, where borders are steps of pixels, of those beside them."""
+    mixed = shares.share < 1
+    some = shares.doubt[mixed if mixed.any() else at_border]
+    return float(some.mean()) if len(some) else 0.0
 
 
 def _in_cells(values: Any, scale: int) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
 FINE_TOLERANCE = 0.3  # [px] up to which corners are looked for at their finest scale
-BENT = 1.0  # [px] of outline beside a corner that its antialiasing bends
 SPACING = 1.5  # [px] between knots, about
-WINDOW = 4.0  # [px] of outline on each side of a knot that tells its place and tangent
+WINDOW = 12.0  # tolerances of outline on each side of a knot that tell its place and tangent
 END_WEIGHT = 16.0  # of a corner or junction, which is known exactly
 RANK = 1e-24  # what is left of a sum of squares, over the whole, that counts as 0
 CHUNK = 8192  # knots that are smoothed at once, which bounds the memory
@@ -38,7 +37,7 @@ class Polyline:
     def scaled(self, factor: float) -> Polyline:
         """Return the outline at another size."""
         start, end = (None if each is None else each * factor for each in (self.start, self.end))
-        return Polyline(self.points * factor, self.closed, start, end, self.is_polygon)
+        return replace(self, points=self.points * factor, start=start, end=end)
 
     def with_ends(self) -> Floats:
         """Return the points and, of an open one, its ends; none of them twice in a row."""
@@ -73,22 +72,26 @@ class Spans:
         return Spans(owner, self.points, first, self.knots[index], self.tangents[index], self.places[index])
 
 
-def cut_at_corners(runs: Sequence[Polyline], tolerance: float) -> Spans:
+def cut_at_corners(
+    runs: Sequence[Polyline], tolerances: Sequence[float], doubt: Floats | None = None
+) -> Spans:
     """Return the spans of runs, in order along each; smooth rings come last.
 
     Args:
         runs: No polygons.
-        tolerance: Of the curves that are to be fitted [px]; for coarser ones corners are broader.
+        tolerances: Of the curves that are to be fitted to each [px]; for coarser ones corners are broader.
+        doubt: As for ``find_corners``.
     """
     lines = Polylines.joined([run.with_ends() for run in runs], [run.closed for run in runs])
-    corners = find_corners(lines, max(1.0, tolerance / FINE_TOLERANCE))
+    corners = find_corners(lines, np.maximum(1, np.asarray(tolerances) / FINE_TOLERANCE), doubt)
     owner, parts = _cut(lines, corners)
     smooth = np.flatnonzero(lines.closed & (np.bincount(corners.owner, minlength=len(lines)) == 0))
     points = [runs[ring].points for ring in smooth.tolist()]
     # Begun where they go straight up or down.
     begun = [np.roll(ring, -int(ring[:, 0].argmin()), axis=0) for ring in points]
     rings = Polylines.joined(begun, [True] * len(begun))
-    return _with_knots(np.concatenate([owner, smooth]), parts.and_also(rings))
+    owner = np.concatenate([owner, smooth])
+    return _with_knots(owner, parts.and_also(rings), WINDOW * np.asarray(tolerances)[owner])
 
 
 def _cut(lines: Polylines, corners: Corners) -> tuple[Ints, Polylines]:
@@ -102,7 +105,8 @@ def _cut(lines: Polylines, corners: Corners) -> tuple[Ints, Polylines]:
     beyond = corners.along[again] + lines.totals[closed]
     along = np.concatenate([lines.along[begin], corners.along, lines.along[end], beyond])
     stops = np.concatenate([lines.points[begin], corners.points, lines.points[end], corners.points[again]])
-    bent = np.repeat([1e-6, BENT, 1e-6, BENT], [len(opened), len(corners.owner), len(opened), len(closed)])
+    at_end = np.full(len(opened), 1e-6)
+    bent = np.concatenate([at_end, corners.bent, at_end, corners.bent[again]])
     order = np.lexsort((along, owner))
     owner, along, stops, bent = owner[order], along[order], stops[order], bent[order]
     cut = np.flatnonzero(owner[1:] == owner[:-1])
@@ -132,8 +136,11 @@ def _between(lines: Polylines, which: Ints, low: Floats, high: Floats) -> tuple[
     return lines.first[which][owner] + ranges(begin, counts) % count[owner], counts
 
 
-def _with_knots(owner: Ints, parts: Polylines) -> Spans:
-    """Return spans of the points of ``parts``, of runs ``owner``."""
+def _with_knots(owner: Ints, parts: Polylines, windows: Floats) -> Spans:
+    """Return spans of the points of ``parts``, of runs ``owner``.
+
+    ``windows``: lengths of outline beside knots that tell where they are, shape (part,).
+    """
     counts = np.maximum(parts.totals / SPACING, 1).astype(np.intp)
     span, number = np.repeat(np.arange(len(parts)), counts + 1), ranges(np.zeros_like(counts), counts + 1)
     first, last = parts.first[:-1][span], parts.first[1:][span] - 1
@@ -144,10 +151,8 @@ def _with_knots(owner: Ints, parts: Polylines) -> Spans:
     is_new = np.append(True, np.diff(places) != 0)[: len(places)]
     span, places = span[is_new], places[is_new]
     around = _three_times_around(parts)
-    smoothed = [
-        _smoothed(parts, around, span[i : i + CHUNK], places[i : i + CHUNK])
-        for i in range(0, max(len(span), 1), CHUNK)
-    ]
+    chunks = [slice(low, low + CHUNK) for low in range(0, max(len(span), 1), CHUNK)]
+    smoothed = [_smoothed(parts, around, span[i], places[i], windows[span[i]]) for i in chunks]
     knots, tangents = (np.concatenate(part) for part in zip(*smoothed, strict=True))
     starts = np.searchsorted(span, np.arange(len(parts) + 1))
     begin, end = starts[:-1], starts[1:] - 1
@@ -167,7 +172,9 @@ def _three_times_around(lines: Polylines) -> Polylines:
     return Polylines(lines.points[index], starts_of(counts), np.zeros(len(lines), np.bool_), along)
 
 
-def _smoothed(lines: Polylines, around: Polylines, which: Ints, places: Ints) -> tuple[Floats, Floats]:
+def _smoothed(
+    lines: Polylines, around: Polylines, which: Ints, places: Ints, window: Floats
+) -> tuple[Floats, Floats]:
     """Return where outlines pass at some points, and their directions, by parabolas through those nearby.
 
     Args:
@@ -175,11 +182,12 @@ def _smoothed(lines: Polylines, around: Polylines, which: Ints, places: Ints) ->
         around: The same three times around.
         which: Numbers of outlines, shape (place,).
         places: Numbers of points of ``lines``, shape (place,).
+        window: Lengths of outline on each side that tell, shape (place,).
     """
     total, closed, count = lines.totals[which], lines.closed[which], lines.counts[which]
     first, last = around.first[which], around.first[which + 1] - 1
     turn, here = closed * count, lines.along[places] + closed * total
-    window = np.where(closed, np.minimum(WINDOW, 0.5 * total), WINDOW)
+    window = np.where(closed, np.minimum(window, 0.5 * total), window)
     middle = first + turn + places - lines.first[which]
     # The third of the nearest points is within reach.
     beside = np.clip(middle - 2, first, np.maximum(last - 4, first)) + np.arange(5)[:, None]

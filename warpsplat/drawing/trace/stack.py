@@ -116,22 +116,16 @@ class Stretches:
 
     @cached_property
     def points(self) -> tuple[Floats, Ints]:
-        """The good points, without those at T-junctions; the first of each stretch and, last, their number.
+        """The good points; the first of each stretch and, last, their number.
 
         Of a hidden stretch, those between the boundary and the middles.
         """
         places = self.layers.boundary.points[self.cracks]
         hidden = (self.kind == HIDDEN)[self.owner, None]
         places = np.where(hidden, 0.5 * (places + self.middles), places)
-        change = self.changes(self.layers.loops.others[self.cracks])
-        after = np.arange(1, len(change) + 1)
-        after[self.first[1:] - 1] = self.first[:-1]
         good = self.layers.boundary.is_good[self.cracks]
-        clean = good & ~(change | change[after])
-        begin = self.first[:-1]
-        counts = [np.add.reduceat(mask.astype(np.intp), begin) for mask in (clean, good)]
-        enough = counts[0] >= np.maximum(4, 0.5 * counts[1])
-        keep = np.where(enough[self.owner], clean, good) | (counts[1] == 0)[self.owner]
+        counts = np.add.reduceat(good.astype(np.intp), self.first[:-1])
+        keep = good | (counts == 0)[self.owner]
         return places[keep], np.searchsorted(np.flatnonzero(keep), self.first)
 
     @cached_property

@@ -13,7 +13,7 @@ from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Ints, unchecked
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, unchecked
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
@@ -32,7 +32,7 @@ from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.ramps import Gradients
 from warpsplat.drawing.trace.regions import find_regions
 from warpsplat.drawing.trace.spans import Polyline
-from warpsplat.drawing.trace.stack import Layers, find_outlines
+from warpsplat.drawing.trace.stack import Layers, Outline, find_outlines
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import GRADIENTS
 from warpsplat.scene.scene import numbers_in, starts_of
@@ -119,12 +119,9 @@ def trace_partition(
         # Bands hide nothing, so that the cover is the same at all depths.
         layers = replace(layers, loops=inner, boundary=find_boundary(inner, layer), has_holes=True)
         outlines += find_outlines(layers)
-    units = _units(loops, sizes, partition.scale)
     contours: dict[int, list[Pieces]] = {}
-    for unit in range(1, partition.scale + 1):
-        some = [(region, outline) for region, outline in outlines if units[region] == unit]
-        for region, contour in _fitted(some, unit, partition, check):
-            contours.setdefault(region, []).append(contour)
+    for region, contour in _fitted(outlines, partition, check):
+        contours.setdefault(region, []).append(contour)
     shapes = [
         Fill(nesting.colorings[region], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
@@ -134,30 +131,22 @@ def trace_partition(
     return _scene(Canvas(width, height, background), merged(shapes))
 
 
-def _units(loops: Loops, sizes: Ints, scale: int) -> Ints:
-    """Return the unit in which lengths along the outline of each region are compared [cell], shape (region,).
-
-    It is a pixel, which is what rounds corners off, or less for what is narrow. ``sizes``: cells of regions.
-    """
-    inner = loops.region != NO_REGION
-    lengths = np.bincount(loops.region[inner], np.diff(loops.first)[inner], len(sizes))
-    widths = 2 * sizes / np.maximum(lengths, 1)
-    return np.asarray(np.clip(widths / NARROW, 1, scale), np.intp)
-
-
 def _fitted(
-    outlines: list[tuple[int, list[Any]]], unit: int, partition: Partition, check: Callable[[], None]
+    outlines: list[tuple[int, Outline]], partition: Partition, check: Callable[[], None]
 ) -> list[tuple[int, Pieces]]:
     """Return the contour of each outline, in pixels; those of less than two curves are left out."""
+    size = 1 / partition.scale
     scaled = [
-        (region, [part.scaled(1 / unit) if isinstance(part, Polyline) else part / unit for part in outline])
+        (region, [part.scaled(size) if isinstance(part, Polyline) else part * size for part in outline])
         for region, outline in outlines
     ]
     runs = [part for _, outline in scaled for part in outline if isinstance(part, Polyline)]
-    tolerance, curves = partition.scale / unit * (TOLERANCE + partition.doubt), list[Pieces]()
+    tolerances = [TOLERANCE + _doubt_along(partition.doubt, run.points) for run in runs]
+    curves = list[Pieces]()
     for first in range(0, len(runs), RUNS_TOGETHER):
         check()
-        curves += fit_polylines(runs[first : first + RUNS_TOGETHER], tolerance)
+        some = slice(first, first + RUNS_TOGETHER)
+        curves += fit_polylines(runs[some], tolerances[some], partition.doubt)
     fitted = iter(curves)
     found = [
         (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
@@ -166,10 +155,17 @@ def _fitted(
     known = [(region, contour) for region, contour in found if contour is not None]
     joined = with_joined_lines([contour for _, contour in known])
     return [
-        (region, replace(contour, cubics=contour.cubics * (unit / partition.scale)))
+        (region, contour)
         for (region, _), contour in zip(known, joined, strict=True)
         if len(contour.cubics) > 1
     ]
+
+
+def _doubt_along(doubt: Floats, points: Floats) -> float:
+    """Return the mean doubt of the pixels that points are in."""
+    height, width = doubt.shape
+    x, y = np.floor(points).astype(np.intp).T
+    return float(doubt[y.clip(0, height - 1), x.clip(0, width - 1)].mean())
 
 
 def _layers(partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
@@ -183,9 +179,6 @@ def _layers(partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, 
     cover = Cover(hiding[partition.labels])
     return Layers(loops, boundary, ranks, hiding, cover, in_holes_with(loops, holed), has_holes)
 
-
-NARROW = 8.0
-"""Least width of a region in units of length, so that corners are compared within its parts."""
 
 TOLERANCE = 0.1
 """Largest distance of an outline of known place from its curve [px]."""
