@@ -37,7 +37,8 @@ def with_main_color(image: Floats, parts: Parts, noise: float) -> Parts:
     sizes = np.bincount(parts.labels[known], minlength=len(parts.paint)) * is_flat
     if not sizes.any():
         return parts
-    main = int(sizes.argmax())
+    # Of the colouring that covers most, which may be in many parts, the largest.
+    main = int((sizes * (parts.paint == np.bincount(parts.paint, sizes).argmax())).argmax())
     color = parts.colorings[parts.paint[main]].color
     rows, columns = np.nonzero(~known)
     mixtures = unmix(image, parts.labels, parts.fills, rows, columns, noise)

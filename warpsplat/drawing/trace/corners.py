@@ -147,7 +147,7 @@ def _at(values: Floats, points: Floats) -> Floats:
     x, y = np.floor(points).astype(np.intp).T
     around = [(y + down, x + right) for down in (-1, 0, 1) for right in (-1, 0, 1)]
     inside = [(row.clip(0, height - 1), column.clip(0, width - 1)) for row, column in around]
-    return np.asarray(np.max([values[place] for place in inside], axis=0))
+    return np.asarray(np.mean([values[place] for place in inside], axis=0))
 
 
 def _meeting(
