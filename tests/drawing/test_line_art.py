@@ -98,9 +98,19 @@ def test_mixed_line_art_keeps_its_areas(device: str) -> None:
     assert np.bincount(result.scene.kind).tolist() == [1, 2]
     assert result.scene.point_counts()[0] <= 30  # a circle, cut where its line leaves it
     assert scored(result).psnr > 34
-    without = lines_of(image, device)
-    assert (without.scene.kind == Kind.STROKE).all()
-    assert scored(result).psnr > scored(without).psnr + 6
+
+
+def test_without_areas_all_is_strokes_a_disc_a_dot_and_the_rest_rings(device: str) -> None:
+    disc = lines_of(drawn(BLOB), device)
+    assert (disc.scene.kind == Kind.STROKE).all()
+    assert len(disc.scene) == 3
+    assert scored(disc).psnr > 34
+    image = drawn('<path d="M8 12H50V60H8Z" fill="#000" stroke="none"/><path d="M70 8V64M50 36H88"/>')
+    rings = lines_of(image, device)
+    assert (rings.scene.kind == Kind.STROKE).all()
+    mixed = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    assert scored(mixed).psnr > scored(rings).psnr > 34
+    assert 2 * len(mixed.svg) < len(rings.svg)
 
 
 def test_areas_alone_are_fills(device: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -9,13 +10,15 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.shapes import merge_near
+from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
-from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
+from warpsplat.drawing.strokes.lines import TracedLines, trace_ink
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
-from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
@@ -23,9 +26,11 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene import FloatArray, IndexArray, Scene
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.svg.sizes import PATH
 
-STROKE_STEPS = 80
+STROKE_STEPS = 240
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
 
 STROKE_POINT_RATE = 0.12
@@ -74,9 +79,11 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     if len(traced.scene):
         start, picture, importance = _to_refine(ink, traced)
         fitted = line_settings(settings, len(start))
-        lines = Problem(picture, fitted, importance)
-        made = fit(lines, run.part(begin, FIT_END), Start(scene=start))
-        made = replace(made, scene=_in_order(traced.scene, made.scene))
+        made = fit(Problem(picture, fitted, importance), run.part(begin, FIT_END), Start(scene=start))
+        widths = np.where(traced.scene.widths < THIN_STROKE, traced.scene.widths, made.scene.widths)
+        lines = replace(traced.scene, points=made.scene.points, widths=widths)
+        lines = with_dots(ink, replace(traced, scene=with_equal_widths(lines)), run)
+        made = replace(made, scene=toured(lines))
     scene, per_pixel = made.scene, made.per_pixel
     if fills:
         both = fills.scene.append(scene)
@@ -84,6 +91,60 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
     scene = replace(scene, layer_names=pen_names(scene))
     return replace(made, scene=cut(scene, across, down), per_pixel=per_pixel)
+
+
+def with_dots(ink: Ink, traced: TracedLines, run: Run) -> Scene:
+    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+    lines = traced.scene
+    if not len(lines):
+        return lines
+    white = replace(lines.canvas, background=np.ones(3, np.float32))
+    black = replace(lines, canvas=white, colors=np.zeros_like(lines.colors))
+    apart = 0 if traced.areas is None else traced.areas.cover
+    drawn = np.maximum(1 - render(black, backend=run.backend)[..., 0], apart)
+    size = PATH * len(lines) + NUMBER * lines.points.size
+    least = worth(float(np.square(ink.cover - drawn).sum()), size) * (PATH + MOVE + LEVEL)
+    inside = np.minimum(depth(ink.mask) - 0.5, BROAD * pen_width(ink.mask))
+    parts: IndexArray = np.asarray(cv2.connectedComponents((ink.cover - drawn > 0.5).astype(np.uint8))[1])
+    dots = []
+    for number, box in enumerate(bounding_boxes(parts - 1, int(parts.max())), 1):
+        reach = math.ceil(inside[parts == number].max())
+        low = np.maximum(np.subtract(box[:2], reach), 0)
+        window = np.s_[low[1] : box.bottom + reach, low[0] : box.right + reach]
+        own, cover, now = parts[window] == number, ink.cover[window], drawn[window]
+        while own.any():
+            x, y, radius = _best_disc(own, inside[window])
+            then = np.maximum(now, disc_cover(now.shape, (x, y), radius))
+            if np.square(cover - now).sum() - np.square(cover - then).sum() <= least:
+                break
+            dots.append((low[0] + x, low[1] + y, 2 * radius))
+            now, own = then, own & (cover - then > 0.5)
+    if not dots:
+        return lines
+    found = np.array(dots, np.float32)
+    colors = at_pixels(ink.shown, found[:, :2])
+    pens = np.linalg.norm(traced.pens - colors[:, None], axis=2).argmin(axis=1)
+    points = np.repeat(found[:, None, :2], 4, axis=1)
+    added = Scene.uniform(Kind.STROKE, lines.canvas, points, colors=traced.pens[pens], widths=found[:, 2])
+    added = replace(added, opacities=np.ones(len(dots), np.float32), layer=pens.astype(np.int32))
+    both = lines.append(added)
+    return both.take(np.argsort(both.layer, kind="stable"))
+
+
+def _best_disc(bare: Bools, inside: Floats) -> tuple[float, float, float]:
+    """Return the largest disc inside ink, x, y and radius, that covers the middle of its bare part.
+
+    Args:
+        bare: The pixels of the part.
+        inside: Radius of the largest disc around each pixel.
+    """
+    left = depth(bare)
+    row, column = np.unravel_index(int(left.argmax()), left.shape)
+    y, x = np.ogrid[: left.shape[0], : left.shape[1]]
+    fits = inside - hypot(y - row, x - column) >= min(float(left[row, column]), float(inside.max())) - 1
+    best = np.where(fits, inside, 0)
+    row, column = np.unravel_index(int(best.argmax()), best.shape)
+    return column + 0.5, row + 0.5, float(best[row, column])
 
 
 def _to_refine(ink: Ink, traced: TracedLines) -> tuple[Scene, FloatArray, FloatArray | None]:
@@ -95,14 +156,6 @@ def _to_refine(ink: Ink, traced: TracedLines) -> tuple[Scene, FloatArray, FloatA
         importance = 1 - traced.areas.cover
         ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
     return start, inked(ink, lines), importance
-
-
-def _in_order(lines: Scene, refined: Scene) -> Scene:
-    """Return refined strokes in the order of a tour, with the pens of the traced ``lines``."""
-    # A fit knows no strokes thinner than a pixel; their widths were measured.
-    widths = np.where(lines.widths < THIN_STROKE, lines.widths, refined.widths)
-    scene = replace(refined, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
-    return toured(with_equal_widths(rejoined(lines, scene)))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.line_art import lengths_of, line_settings, with_equal_widths
-from warpsplat.drawing.strokes.ink import Ink
+from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.lines import trace_ink
-from warpsplat.drawing.strokes.ridges import FAINT, across, middles, with_thin
 from warpsplat.drawing.trace.grids import at_pixels
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Problem, Run

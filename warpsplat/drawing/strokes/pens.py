@@ -14,10 +14,6 @@ LEAST_COVER = 0.1  # cover from which on its colour can be told
 ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
 SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
 MOST = 8  # pens
-STEP, STEP_PX = 0.3, 1.0
-"""Difference of a line's widths up to which it is drawn with one, over their mean; and [px]."""
-
-SHORTEST = 4.0  # length of a part with a width of its own, over that width, at the least
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -89,32 +85,3 @@ def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
     sums = np.cumsum(weights[order], axis=0)
     middle = (sums >= 0.5 * sums[-1]).argmax(axis=0)
     return np.asarray(np.take_along_axis(values, np.take_along_axis(order, middle[None], 0), 0)[0])
-
-
-def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:
-    """Split a line where its pen's width changes: first point, last point, width of each part.
-
-    Args:
-        widths: At the points of a line [px], shape (point,).
-        spacing: Of the points [px].
-    """
-    sums = np.concatenate([[0.0], np.cumsum(widths)])
-
-    def parts(low: int, high: int) -> list[tuple[int, int]]:
-        total = sums[high] - sums[low]
-        least = max(2, round(SHORTEST * float(total) / (high - low) / max(spacing, 1e-6)))
-        cuts = np.arange(low + least, high - least + 1)
-        if len(cuts):
-            before, after = sums[cuts] - sums[low], sums[high] - sums[cuts]
-            # The cut of the least squared deviations.
-            best = (before * before / (cuts - low) + after * after / (high - cuts)).argmax()
-            cut = int(cuts[best])
-            widths_of_parts = np.median(widths[low:cut]), np.median(widths[cut:high])
-            if abs(np.subtract(*widths_of_parts)) > max(STEP_PX, STEP * np.mean(widths_of_parts)):
-                return [*parts(low, cut), *parts(cut, high)]
-        return [(low, high)]
-
-    return [
-        (low, min(high, len(widths) - 1), float(np.median(widths[low:high])))
-        for low, high in parts(0, len(widths))
-    ]
