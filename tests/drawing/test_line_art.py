@@ -42,6 +42,13 @@ def test_the_strokes_are_the_ink(paths: str, device: str) -> None:
     assert scored(result).psnr > 26
 
 
+def test_a_ring_is_one_closed_stroke_of_its_place_and_width(device: str) -> None:
+    scene = lines_of(drawn('<circle cx="48" cy="36" r="22"/>'), device).scene
+    assert scene.closed.tolist() == [1]
+    assert scene.widths == pytest.approx(3, abs=0.1)
+    assert np.hypot(*(scene.points[::3] - (48, 36)).T) == pytest.approx(22, abs=0.15)
+
+
 def test_jpeg_and_grey_paper(device: str) -> None:
     image = drawn(TEE, ground="#ccc")
     ok, data = cv2.imencode(".jpg", (255 * image).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 60])

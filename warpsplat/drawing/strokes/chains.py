@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from warpsplat.drawing.strokes.skeleton import Edge, Graph, contracted
-from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
+from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.portable.elementary import arctan2, exp, hypot
 from warpsplat.portable.sequences import convolve, interp
@@ -148,28 +148,19 @@ def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
     return early + pairs, cost + sum(costs[pair] for pair in early)
 
 
-def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floats, bool] | None:
-    """Return points and widths along a chain, and whether it is a ring; None where there is too little of it.
-
-    Args:
-        graph: Of the edges.
-        edges: A chain.
-        radii: Half the width of the ink at each pixel.
-    """
+def traced(graph: Graph, edges: list[Edge]) -> tuple[Floats, bool] | None:
+    """Return points along a chain of edges, and whether it is a ring; None if there is too little of it."""
     parts = [_unbent(graph, edge) for edge in edges]
     points = np.concatenate(parts)
-    widths = 2 * at_pixels(radii, points)
     first = edges[0].nodes[0]
     closed = first == edges[-1].nodes[1] and len(parts[0]) > 0 and _is_smooth_ring(graph, edges)
     if not closed:
         start, end = edges[0].points[0], edges[-1].points[-1]
         if len(points) > 3:
-            radius = float(np.median(widths)) / 2
+            radius = float(np.median([edge.half_width for edge in edges]))
             start, end = _ahead(points, start, radius), _ahead(points[::-1], end, radius)
         points = np.concatenate([start[None], points, end[None]])
-        empty = np.full(2, 2 * float(graph.radii[first]))
-        widths = np.pad(widths, 1, mode="edge") if len(widths) else empty
-    return smoothed(points, widths, closed) if len(points) > 1 else None
+    return smoothed(points, closed=closed) if len(points) > 1 else None
 
 
 def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
@@ -204,28 +195,24 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
     return np.asarray(edge.points[inner & (along >= before) & (along <= total - after)])
 
 
-def smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Floats, bool]:
+def smoothed(points: Floats, *, closed: bool) -> tuple[Floats, bool]:
     """Return a line with one point a pixel, without the steps of pixels; and whether it is still closed."""
     if closed and hypot(*(points[0] - points[-1])) > 1e-6:
-        points, widths = np.concatenate([points, points[:1]]), np.concatenate([widths, widths[:1]])
+        points = np.concatenate([points, points[:1]])
     along = arc_lengths(points)
-    total = float(along[-1])
-    at = np.linspace(0, total, max(2, round(total) + 1))
+    at = np.linspace(0, float(along[-1]), max(2, round(float(along[-1])) + 1))
     even = np.stack([interp(at, along, points[:, axis]) for axis in (0, 1)], axis=1)
-    wide = interp(at, along, widths)
     if closed:
-        even, wide = even[:-1], wide[:-1]
+        even = even[:-1]
     if len(even) < 4:
-        return even, wide, closed and len(even) > 2
+        return even, closed and len(even) > 2
     reach = min(round(3 * SMOOTH), len(even) - 1)
     kernel = exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH) ** 2)
-    kernel /= kernel.sum()
     if closed:
         padded = np.concatenate([even[-reach:], even, even[:reach]])
     else:  # mirrored at the ends, which so stay where they are
         padded = np.pad(even, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
-    smooth = np.stack([convolve(padded[:, axis], kernel) for axis in (0, 1)], axis=1)
-    return smooth, wide, closed
+    return np.stack([convolve(padded[:, axis], kernel / kernel.sum()) for axis in (0, 1)], axis=1), closed
 
 
 def with_crossings(graph: Graph) -> Graph:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -10,18 +11,18 @@ import numpy as np
 from warpsplat.drawing.strokes.broad import Areas, Split, distance_from, split
 from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced, with_crossings
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
-from warpsplat.drawing.strokes.measure import measured
 from warpsplat.drawing.strokes.pens import find_pens, line_colors
 from warpsplat.drawing.strokes.skeleton import find_graph
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, dilated, eroded
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, dilated, eroded, nearest_in
+from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
-TOLERANCE = 0.45  # [px] largest distance of a centre line from its curve
+TOLERANCE = 0.4  # [px] largest distance of a centre line from its curve
 THINNEST, LONG = 0.3, 6.0
 """Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
 FINE = 1100  # [px] longer side of an image up to which its ink is thinned at twice the size
@@ -33,11 +34,11 @@ class CenterLine:
 
     points: Floats
     """Places on the centre line [px], shape (point, 2); the first one of a ring is not repeated."""
-    widths: Floats
-    """There [px], shape (point,)."""
     closed: bool
     pen: int
     """Row of the pens' colours."""
+    width: float = 0.0
+    """[px]"""
 
     def polyline(self) -> Polyline:
         """Return the line as curves are fitted to it."""
@@ -81,8 +82,7 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
         only_lines: Whether it has no broad parts, however wide it is.
     """
     found = find_lines(ink, mixed=mixed, only_lines=only_lines)
-    strokes = [stroke for line in found.lines for stroke in _strokes(line, thin=not ink.textured)]
-    strokes.sort(key=lambda stroke: stroke.pen)
+    strokes = sorted(found.lines, key=lambda stroke: stroke.pen)
     fitted = fit_polylines([stroke.polyline() for stroke in strokes], TOLERANCE)
     height, width = ink.mask.shape
     scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, found.pens)
@@ -93,7 +93,7 @@ def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> St
     """Find the centre lines of ink; through junctions they go straight on. Arguments as ``trace_ink``."""
     parts = Split(ink) if only_lines else split(ink, mixed=mixed)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
-    graph, radii = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
+    graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
     graph = with_crossings(graph)
     places: list[list[Floats]] = [
         [edge.points / fine for edge in graph.edges],
@@ -105,18 +105,18 @@ def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> St
     bounds = np.cumsum([len(some) for some in places])[:-1]
     edge_pens, ring_pens, area_pens, dot_pens = np.split(owners, bounds)
     away = None if parts.apart is None else distance_from(parts.apart)
-    lines = []
+    lines: list[CenterLine] = []
     for edges, pen in find_chains(graph, edge_pens):
-        line = traced(graph, edges, radii)
+        line = traced(graph, edges)
         if line is not None:
-            points, widths, closed = line
-            measure = measured(points / fine, widths / fine, closed, parts.thin.cover)
-            drawn = CenterLine(*measure, closed, pen)
-            lines += [drawn] if away is None else _joined_to(away, drawn)
+            lines.append(CenterLine(line[0] / fine, line[1], pen))
+    lines = _measured(lines, parts.thin.cover, thinnest=1.0 if ink.textured else THINNEST)
+    if away is not None:
+        lines = [joined for line in lines for joined in _joined_to(away, line)]
     for ring, pen in zip(parts.rings, ring_pens.tolist(), strict=True):
-        lines.append(CenterLine(*smoothed(ring, np.full(len(ring), parts.width), closed=True), pen))
+        lines.append(CenterLine(*smoothed(ring, closed=True), pen, parts.width))
     for dot, pen in zip(parts.dots, dot_pens.tolist(), strict=True):
-        lines.append(CenterLine(np.stack([dot.place] * 2), np.full(2, dot.width), False, pen))
+        lines.append(CenterLine(np.stack([dot.place] * 2), False, pen, dot.width))
     return Strokes(lines, pens, parts.areas, area_pens)
 
 
@@ -127,20 +127,46 @@ def _joined_to(away: Floats, line: CenterLine) -> list[CenterLine]:
         away: Distance of each pixel from the areas [px], shape (height, width).
         line: Of ink beside the areas.
     """
-    points, widths = line.points, line.widths
-    if (at_pixels(away, points) <= widths + 1).all():
+    points, width = line.points, line.width
+    if (at_pixels(away, points) <= width + 1).all():
         return []
     if line.closed:
         return [line]
     for _ in range(2):  # the end, and the other one
-        wide, apart = float(widths[-1]), float(at_pixels(away, points[-1:])[0])
-        if apart <= wide + 1:
-            back = points[-1] - points[max(0, len(points) - 2 - round(2 * wide))]
+        apart = float(at_pixels(away, points[-1:])[0])
+        if apart <= width + 1:
+            back = points[-1] - points[max(0, len(points) - 2 - round(2 * width))]
             direction = back / max(float(hypot(*back)), 1e-9)
-            points = np.concatenate([points, points[-1:] + (apart + wide) * direction])
-            widths = np.append(widths, wide)
-        points, widths = points[::-1], widths[::-1]
-    return [CenterLine(points, widths, False, line.pen)]
+            points = np.concatenate([points, points[-1:] + (apart + width) * direction])
+        points = points[::-1]
+    return [replace(line, points=points)]
+
+
+def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> list[CenterLine]:
+    """Return lines with the widths at which they have the ink that is nearest to them.
+
+    Args:
+        lines: Of an image.
+        cover: Inked share of each pixel, shape (height, width).
+        thinnest: Width of a line, at the least, if it is longer than LONG [px]; of others 1.
+    """
+    if not lines:
+        return lines
+    owner = np.full(cover.shape, -1, np.intp)
+    for number, line in enumerate(lines):
+        columns, rows = np.clip(line.points.astype(np.intp).T, 0, np.array(cover.shape[::-1])[:, None] - 1)
+        owner[rows, columns] = number
+    nearest = owner.reshape(-1)[nearest_in(owner >= 0)]
+    ink = np.bincount(nearest.reshape(-1), cover.reshape(-1), len(lines))
+    found = []
+    for line, area in zip(lines, ink.tolist(), strict=True):
+        length = float(arc_lengths(line.points, closed=line.closed)[-1])
+        # An open line has the area of its caps, too.
+        width = (
+            area / length if line.closed else 2 * (math.sqrt(length**2 + math.pi * area) - length) / math.pi
+        )
+        found.append(replace(line, width=max(width, thinnest if length >= LONG else 1.0)))
+    return found
 
 
 def _enlarged(ink: Ink, factor: int) -> Bools:
@@ -153,14 +179,6 @@ def _enlarged(ink: Ink, factor: int) -> Bools:
         return inked
     thin = middles(across(ink.cover, factor), FAINT, factor)
     return with_thin(inked, thin & held, factor)
-
-
-def _strokes(line: CenterLine, *, thin: bool) -> list[CenterLine]:
-    """Return a line in parts of one width, which may be less than a pixel if ``thin``."""
-    length = float(hypot(*np.diff(line.points, axis=0).T).sum())
-    least = THINNEST if thin and length >= LONG else 1.0
-    widths = np.maximum(line.widths, least)
-    return [CenterLine(line.points, np.full(len(widths), np.median(widths)), line.closed, line.pen)]
 
 
 def _scene(canvas: Canvas, strokes: list[CenterLine], fitted: list[Pieces], pens: FloatArray) -> Scene:
@@ -179,6 +197,6 @@ def _scene(canvas: Canvas, strokes: list[CenterLine], fitted: list[Pieces], pens
         closed=np.array([stroke.closed for stroke in strokes], np.int32),
         colors=pens[owner].reshape(-1, 3),
         opacities=np.ones(len(strokes), np.float32),
-        widths=np.array([stroke.widths[0] for stroke in strokes], np.float32),
+        widths=np.array([stroke.width for stroke in strokes], np.float32),
         layer=owner,
     )

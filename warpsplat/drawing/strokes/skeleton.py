@@ -55,12 +55,12 @@ class Graph:
                 self.at[node].append(number)
 
 
-def find_graph(mask: Bools) -> tuple[Graph, Floats]:
-    """Return the skeleton of ``mask`` without burrs, and half the width of the ink at each pixel."""
+def find_graph(mask: Bools) -> Graph:
+    """Return the skeleton of ``mask`` without burrs."""
     inside = np.pad(mask.astype(np.uint8), 1)
     radii = np.maximum(depth(mask) - 0.5, 0.5)
     thin = cv2.ximgproc.thinning(255 * inside, thinningType=cv2.ximgproc.THINNING_GUOHALL)[1:-1, 1:-1] > 0
-    return _without_burrs(_graph(thin, radii)), radii
+    return _without_burrs(_graph(thin, radii))
 
 
 def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
