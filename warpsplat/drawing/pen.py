@@ -78,7 +78,7 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     shown = render(replace(alone, colors=black, opacities=solid), backend=run.backend)
     cover = 1 - shown[..., 0]
     mask = with_thin(cover > 0.5, middles(across(cover), FAINT))
-    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene
+    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene()
     if not len(traced):
         return shape
     traced = replace(

@@ -8,7 +8,7 @@ import pytest
 from tests.drawing.trace.line_art import drawn
 from warpsplat.drawing.strokes.broad import split
 from warpsplat.drawing.strokes.ink import find_ink
-from warpsplat.drawing.strokes.lines import find_lines
+from warpsplat.drawing.strokes.lines import trace_ink
 
 BLOB = '<circle cx="30" cy="36" r="16" fill="#000"/><path d="M30 36H88"/>'
 STAR = '<path d="M30 8l7 21h22l-18 13 7 21-18-13-18 13 7-21L1 29h22z" fill="#000" stroke="none"/>'
@@ -18,7 +18,8 @@ def test_lines_alone_have_no_areas() -> None:
     ink = find_ink(drawn('<path d="M10 20H86"/><path d="M48 20V62"/>'))
     for mixed in (False, True):
         parts = split(ink, mixed=mixed)
-        assert parts.areas is parts.apart is None
+        assert parts.areas is None
+        assert parts.apart is None
         assert not parts.rings
         assert (parts.thin.mask == ink.mask).all()
 
@@ -52,7 +53,7 @@ def test_tips_belong_to_their_area() -> None:
 
 
 def test_a_line_reaches_into_its_area() -> None:
-    drawing = find_lines(find_ink(drawn(BLOB)), mixed=True)
+    drawing = trace_ink(find_ink(drawn(BLOB)), mixed=True)
     assert drawing.areas is not None
     assert len(drawing.lines) == 1
     ends = drawing.lines[0].points[[0, -1]]
@@ -63,7 +64,7 @@ def test_a_line_reaches_into_its_area() -> None:
 
 def test_pens_have_the_colour_of_their_areas() -> None:
     image = drawn('<circle cx="30" cy="36" r="16" fill="#c00" stroke="none"/><path d="M60 5V60M60 30H90"/>')
-    drawing = find_lines(find_ink(image, mixed=True), mixed=True)
+    drawing = trace_ink(find_ink(image, mixed=True), mixed=True)
     assert np.allclose(drawing.pens[drawing.area_pens[0]], [0.8, 0, 0], atol=0.01)
     assert drawing.lines[0].pen != drawing.area_pens[0]
 
@@ -71,7 +72,7 @@ def test_pens_have_the_colour_of_their_areas() -> None:
 def test_ends_far_from_areas_stay() -> None:
     """A line reaches beyond its own width into the area at one of its ends."""
     image = drawn('<path d="M4 16H36V56H4Z" fill="#000" stroke="none"/><path d="M30 36H80"/>')
-    (line,) = find_lines(find_ink(image), mixed=True).lines
+    (line,) = trace_ink(find_ink(image), mixed=True).lines
     near, far = sorted(line.points[[0, -1], 0].tolist())
     assert 30 < near < 35
     assert far == pytest.approx(80, abs=1.2)

@@ -13,7 +13,7 @@ from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced, with
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.pens import find_pens, line_colors
 from warpsplat.drawing.strokes.skeleton import find_graph
-from warpsplat.drawing.trace.curves import Pieces, fit_polylines
+from warpsplat.drawing.trace.curves import fit_polylines
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, dilated, eroded, nearest_in
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.drawing.trace.spans import Polyline
@@ -48,23 +48,12 @@ class CenterLine:
 
 
 @dataclass(frozen=True)
-class Strokes:
-    """Lines, what they are drawn with, and filled areas where these were asked for."""
-
-    lines: list[CenterLine]
-    pens: FloatArray
-    """sRGB in [0, 1], shape (pen, 3)."""
-    areas: Areas | None
-    area_pens: Ints
-    """Row of the pens' colours of each area."""
-
-
-@dataclass(frozen=True)
 class TracedLines:
     """Traced line art."""
 
-    scene: Scene
-    """Strokes; ``layer`` is the pen of each."""
+    lines: list[CenterLine]
+    """Ordered by their pens."""
+    canvas: Canvas
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
     areas: Areas | None
@@ -72,25 +61,37 @@ class TracedLines:
     area_pens: Ints
     """The pen of each area."""
 
+    def scene(self) -> Scene:
+        """Return the lines as opaque strokes; ``layer`` is the pen of each."""
+        fitted = fit_polylines([line.polyline() for line in self.lines], TOLERANCE)
+        # Closed chains do not repeat their first point.
+        chains = [
+            np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][line.closed :]])
+            for line, pieces in zip(self.lines, fitted, strict=True)
+        ]
+        count, owner = len(chains), np.array([line.pen for line in self.lines], np.int32)
+        return Scene(
+            self.canvas,
+            np.full(count, Kind.STROKE, np.int32),
+            starts_of(np.array([len(points) for points in chains], np.int64)),
+            np.full(count, Basis.CUBIC, np.int32),
+            points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
+            closed=np.array([line.closed for line in self.lines], np.int32),
+            colors=self.pens[owner].reshape(-1, 3),
+            opacities=np.ones(count, np.float32),
+            widths=np.array([line.width for line in self.lines], np.float32),
+            layer=owner,
+        )
+
 
 def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> TracedLines:
-    """Trace the centre lines of ink as opaque strokes, with a layer for each pen.
+    """Find the centre lines of ink, and their pens; through junctions they go straight on.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas, which are not traced.
         only_lines: Whether it has no broad parts, however wide it is.
     """
-    found = find_lines(ink, mixed=mixed, only_lines=only_lines)
-    strokes = sorted(found.lines, key=lambda stroke: stroke.pen)
-    fitted = fit_polylines([stroke.polyline() for stroke in strokes], TOLERANCE)
-    height, width = ink.mask.shape
-    scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, found.pens)
-    return TracedLines(scene, found.pens, found.areas, found.area_pens)
-
-
-def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Strokes:
-    """Find the centre lines of ink; through junctions they go straight on. Arguments as ``trace_ink``."""
     parts = Split(ink) if only_lines else split(ink, mixed=mixed)
     fine = 2 if max(ink.mask.shape) <= FINE else 1
     graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
@@ -117,7 +118,9 @@ def find_lines(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> St
         lines.append(CenterLine(*smoothed(ring, closed=True), pen, parts.width))
     for dot, pen in zip(parts.dots, dot_pens.tolist(), strict=True):
         lines.append(CenterLine(np.stack([dot.place] * 2), False, pen, dot.width))
-    return Strokes(lines, pens, parts.areas, area_pens)
+    height, width = ink.mask.shape
+    lines.sort(key=lambda line: line.pen)
+    return TracedLines(lines, Canvas(width, height, ink.paper), pens, parts.areas, area_pens)
 
 
 def _joined_to(away: Floats, line: CenterLine) -> list[CenterLine]:
@@ -179,24 +182,3 @@ def _enlarged(ink: Ink, factor: int) -> Bools:
         return inked
     thin = middles(across(ink.cover, factor), FAINT, factor)
     return with_thin(inked, thin & held, factor)
-
-
-def _scene(canvas: Canvas, strokes: list[CenterLine], fitted: list[Pieces], pens: FloatArray) -> Scene:
-    """Return strokes as a ``Scene``, in which closed chains do not repeat their first point."""
-    chains = [
-        np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][stroke.closed :]])
-        for stroke, pieces in zip(strokes, fitted, strict=True)
-    ]
-    owner = np.array([stroke.pen for stroke in strokes], np.int32)
-    return Scene(
-        canvas,
-        np.full(len(strokes), Kind.STROKE, np.int32),
-        starts_of(np.array([len(points) for points in chains], np.int64)),
-        np.full(len(strokes), Basis.CUBIC, np.int32),
-        points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
-        closed=np.array([stroke.closed for stroke in strokes], np.int32),
-        colors=pens[owner].reshape(-1, 3),
-        opacities=np.ones(len(strokes), np.float32),
-        widths=np.array([stroke.width for stroke in strokes], np.float32),
-        layer=owner,
-    )

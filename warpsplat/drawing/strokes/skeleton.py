@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -10,7 +11,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, at_pixels, depth
 from warpsplat.portable.elementary import hypot
 
-STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
+STEPS = sorted(itertools.product(range(-1, 2), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))[1:]
 """Rows and columns to the neighbours of a pixel, the straight ones first."""
 
 SPUR = 1.5  # how far the ink of a burr reaches, over half the width where it begins, and a pixel
