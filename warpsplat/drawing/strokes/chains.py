@@ -23,7 +23,6 @@ End = tuple[int, int]
 
 REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
 BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
-FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
 SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
 
 
@@ -186,7 +185,7 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
     """Return the points of an edge that no junction bends, without its nodes: means of several pixels."""
     along = arc_lengths(edge.points)
     total = along[-1]
-    reach = {1: FORKED, 2: 0.0}
+    reach = {1: 1.0, 2: 0.0}  # at a free end the corners of the outline bend it
     before, after = (reach.get(len(graph.at[node]), BENT) * float(graph.radii[node]) for node in edge.nodes)
     if before + after > 0.8 * total:
         scale = 0.8 * total / max(before + after, 1e-9)

@@ -44,7 +44,6 @@ FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 """Least contrast of ink with the paper around it, in [0, 1], and in standard deviations of the noise."""
 
 DARK = 0.6  # contrast of a small dot that is no dirt, over that of strong ink
-NOISELESS = 0.01  # standard deviation of the noise up to which nothing is blurred
 WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
 
 
@@ -62,9 +61,6 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     is_textured = _is_colored_in(small)
     contrast = _contrast(light, small, in_all=is_textured)
     noise = _noise(contrast)
-    if noise > NOISELESS:
-        contrast = filters.gaussian_blur(contrast, 0.8)
-        noise *= 0.5
     floor = max(FAINTEST, FAINTEST_NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
@@ -141,9 +137,6 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
-SOLID = 0.9  # contrast with the image's paper from which on what is broad is ink, over that of lines
-
-
 def _with_solid(
     contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool, alone: bool
 ) -> FloatArray:
@@ -156,7 +149,7 @@ def _with_solid(
     lines = contrast > 0.5 * strong
     if not lines.any() and not alone:
         return contrast
-    solid = whole > SOLID * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
+    solid = whole > FULL * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
     # With its edge, whose pixels are mixed.
     return np.asarray(np.where(dilated(solid, 3), np.maximum(contrast, whole), contrast), np.float32)
 

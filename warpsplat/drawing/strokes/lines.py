@@ -23,8 +23,7 @@ from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
 TOLERANCE = 0.4  # [px] largest distance of a centre line from its curve
-THINNEST, LONG = 0.3, 6.0
-"""Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
+THINNEST = 0.3  # [px] width of a stroke, at the least; of crayons one pixel
 FINE = 1100  # [px] longer side of an image up to which its ink is thinned at twice the size
 
 
@@ -151,7 +150,7 @@ def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> li
     Args:
         lines: Of an image.
         cover: Inked share of each pixel, shape (height, width).
-        thinnest: Width of a line, at the least, if it is longer than LONG [px]; of others 1.
+        thinnest: Width of a line, at the least [px].
     """
     if not lines:
         return lines
@@ -168,7 +167,7 @@ def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> li
         width = (
             area / length if line.closed else 2 * (math.sqrt(length**2 + math.pi * area) - length) / math.pi
         )
-        found.append(replace(line, width=max(width, thinnest if length >= LONG else 1.0)))
+        found.append(replace(line, width=max(width, thinnest)))
     return found
 
 

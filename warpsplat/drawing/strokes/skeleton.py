@@ -11,9 +11,6 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, at_pixels, depth
 from warpsplat.portable.elementary import hypot
 
-STEPS = sorted(itertools.product(range(-1, 2), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))[1:]
-"""Rows and columns to the neighbours of a pixel, the straight ones first."""
-
 SPUR = 1.5  # how far the ink of a burr reaches, over half the width where it begins, and a pixel
 
 
@@ -69,13 +66,15 @@ def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
 
     A diagonal neighbour counts only where no straight step leads to a neighbour of both.
     """
+    # The straight steps first.
+    steps = sorted(itertools.product((-1, 0, 1), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))[1:]
     padded = np.pad(thin, 1)
     number = np.full(padded.shape, -1, np.int64)
     pixels = np.argwhere(padded)
     number[padded] = np.arange(len(pixels))
     rows, columns = pixels.T
-    found = np.stack([number[rows + down, columns + across] for down, across in STEPS], axis=1)
-    for slot, (down, across) in enumerate(STEPS[4:], 4):
+    found = np.stack([number[rows + down, columns + across] for down, across in steps], axis=1)
+    for slot, (down, across) in enumerate(steps[4:], 4):
         found[padded[rows + down, columns] | padded[rows, columns + across], slot] = -1
     return pixels - 1, [[n for n in row if n >= 0] for row in found.tolist()]
 
