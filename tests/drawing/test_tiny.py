@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import warpsplat
-from warpsplat.drawing.strokes.blobs import pen_width
+from warpsplat.drawing.strokes.broad import pen_width
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import Subject
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.shapes import merge_near
+from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
-from warpsplat.drawing.strokes.lines import TracedLines, rejoined, trace_ink
+from warpsplat.drawing.strokes.lines import TracedLines, trace_ink
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
-from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
@@ -23,9 +26,11 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene import FloatArray, IndexArray, Scene
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.svg.sizes import PATH
 
-STROKE_STEPS = 80
+STROKE_STEPS = 240
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
 
 STROKE_POINT_RATE = 0.12
@@ -65,44 +70,94 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     if color is not None or settings.background == "none":
         ink = replace(ink, paper=color)
     traced = trace_ink(ink, mixed=settings.mixed)
-    if not len(traced.scene) and not traced.areas:
+    if not traced.lines and not traced.areas:
         raise ImageError("no lines found: nothing but specks is darker than the paper around it")
-    fills, begin = None, FILLED_END if traced.areas else 0.0
+    begin = FILLED_END if traced.areas else 0.0
+    lines, fills = traced.scene(), traced.scene().take(np.zeros(0, np.intp))
+    made, per_pixel = Fit(lines, 1.0, 0.0, 0.0, 0, False), 1.0
     if traced.areas:
-        fills = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
-    made = Fit(traced.scene, 1.0, 0.0, 0.0, 0, False)
-    if len(traced.scene):
-        start, picture, importance = _to_refine(ink, traced)
+        fills, per_pixel = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
+    if len(lines):
+        start, picture, importance = _to_refine(ink, traced, lines)
         fitted = line_settings(settings, len(start))
-        lines = Problem(picture, fitted, importance)
-        made = fit(lines, run.part(begin, FIT_END), Start(scene=start))
-        made = replace(made, scene=_in_order(traced.scene, made.scene))
-    scene, per_pixel = made.scene, made.per_pixel
-    if fills:
-        both = fills.scene.append(scene)
-        scene, per_pixel = both.take(np.argsort(both.layer, kind="stable")), max(per_pixel, fills.per_pixel)
+        made = fit(Problem(picture, fitted, importance), run.part(begin, FIT_END), Start(scene=start))
+        widths = np.where(lines.widths < THIN_STROKE, lines.widths, made.scene.widths)
+        lines = with_equal_widths(replace(lines, points=made.scene.points, widths=widths))
+        lines = toured(with_dots(ink, traced, lines, run))
+    scene = fills.append(lines)
+    scene = scene.take(np.argsort(scene.layer, kind="stable"))
     scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
     scene = replace(scene, layer_names=pen_names(scene))
-    return replace(made, scene=cut(scene, across, down), per_pixel=per_pixel)
+    return replace(made, scene=cut(scene, across, down), per_pixel=max(per_pixel, made.per_pixel))
 
 
-def _to_refine(ink: Ink, traced: TracedLines) -> tuple[Scene, FloatArray, FloatArray | None]:
-    """Return the strokes on the paper, the picture they are refined against, and its importance mask."""
-    lines = traced.scene
-    canvas = replace(lines.canvas, background=_paper(ink))
-    start, importance = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas), None
+def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
+    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+    white = replace(lines.canvas, background=np.ones(3, np.float32))
+    black = replace(lines, canvas=white, colors=np.zeros_like(lines.colors))
+    apart = 0 if traced.areas is None else traced.areas.cover
+    drawn = np.maximum(1 - render(black, backend=run.backend)[..., 0], apart)
+    size = PATH * len(lines) + NUMBER * lines.points.size
+    least = worth(float(np.square(ink.cover - drawn).sum()), size) * (PATH + MOVE + LEVEL)
+    inside = np.minimum(depth(ink.mask) - 0.5, BROAD * pen_width(ink.mask))
+    parts: IndexArray = np.asarray(cv2.connectedComponents((ink.cover - drawn > 0.5).astype(np.uint8))[1])
+    dots = []
+    for number, box in enumerate(bounding_boxes(parts - 1, int(parts.max())), 1):
+        reach = math.ceil(inside[parts == number].max())
+        low = np.maximum(np.subtract(box[:2], reach), 0)
+        window = np.s_[low[1] : box.bottom + reach, low[0] : box.right + reach]
+        own, cover, now = parts[window] == number, ink.cover[window], drawn[window]
+        while own.any():
+            x, y, radius = _best_disc(own, inside[window])
+            then = np.maximum(now, disc_cover(now.shape, (x, y), radius))
+            if np.square(cover - now).sum() - np.square(cover - then).sum() <= least:
+                break
+            dots.append((low[0] + x, low[1] + y, 2 * radius))
+            now, own = then, own & (cover - then > 0.5)
+    if not dots:
+        return lines
+    found = np.array(dots, np.float32)
+    colors = at_pixels(ink.shown, found[:, :2])
+    pens = np.linalg.norm(traced.pens - colors[:, None], axis=2).argmin(axis=1)
+    points = np.repeat(found[:, None, :2], 4, axis=1)
+    added = Scene.uniform(Kind.STROKE, lines.canvas, points, colors=traced.pens[pens], widths=found[:, 2])
+    added = replace(added, opacities=np.ones(len(dots), np.float32), layer=pens.astype(np.int32))
+    both = lines.append(added)
+    return both.take(np.argsort(both.layer, kind="stable"))
+
+
+def _best_disc(bare: Bools, inside: Floats) -> tuple[float, float, float]:
+    """Return the largest disc inside ink, x, y and radius, that covers the middle of its bare part.
+
+    Args:
+        bare: The pixels of the part.
+        inside: Radius of the largest disc around each pixel.
+    """
+    left = depth(bare)
+    row, column = np.unravel_index(int(left.argmax()), left.shape)
+    y, x = np.ogrid[: left.shape[0], : left.shape[1]]
+    fits = inside - hypot(y - row, x - column) >= min(float(left[row, column]), float(inside.max())) - 1
+    best = np.where(fits, inside, 0)
+    row, column = np.unravel_index(int(best.argmax()), best.shape)
+    return column + 0.5, row + 0.5, float(best[row, column])
+
+
+def _to_refine(ink: Ink, traced: TracedLines, lines: Scene) -> tuple[Scene, FloatArray, FloatArray | None]:
+    """Return strokes on the paper, the picture they are refined against, and its importance mask.
+
+    In the picture even ink of the pen whose mixture is nearest is on even paper.
+    """
+    paper = np.ones(3, np.float32) if ink.paper is None else ink.paper
+    canvas = replace(lines.canvas, background=paper)
+    start = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas)
+    cover, importance = ink.cover[..., None], None
     if traced.areas:  # strokes reach into them
         importance = 1 - traced.areas.cover
-        ink = replace(ink, cover=np.where(traced.areas.cover > 0, 0, ink.cover).astype(np.float32))
-    return start, inked(ink, lines), importance
-
-
-def _in_order(lines: Scene, refined: Scene) -> Scene:
-    """Return refined strokes in the order of a tour, with the pens of the traced ``lines``."""
-    # A fit knows no strokes thinner than a pixel; their widths were measured.
-    widths = np.where(lines.widths < THIN_STROKE, lines.widths, refined.widths)
-    scene = replace(refined, layer=lines.layer, colors=lines.colors, canvas=lines.canvas, widths=widths)
-    return toured(with_equal_widths(rejoined(lines, scene)))
+        cover = cover * (importance == 1)[..., None]
+    mixtures = [paper + cover * (pen - paper) for pen in traced.pens]
+    away = [np.square(ink.shown - mixture).sum(axis=2) for mixture in mixtures]
+    picture = np.take_along_axis(np.stack(mixtures), np.argmin(away, axis=0)[None, ..., None], axis=0)[0]
+    return start, picture.astype(np.float32), importance
 
 
 def with_equal_widths(strokes: Scene) -> Scene:
@@ -143,31 +198,6 @@ def line_settings(settings: Settings, count: int) -> Settings:
     )
 
 
-def _paper(ink: Ink) -> FloatArray:
-    return np.ones(3, np.float32) if ink.paper is None else ink.paper
-
-
-def inked(ink: Ink, traced: Scene) -> FloatArray:
-    """Return the ideal picture of the strokes, even ink on even paper, shape (height, width, 3).
-
-    Only the position of the ink then influences the strokes.
-    """
-    color = _nearest_colors(traced, ink) if traced.layer.max() > 0 else traced.colors[:1]
-    paper = _paper(ink)
-    return np.asarray(paper + ink.cover[..., None] * (color - paper), np.float32)
-
-
-def _nearest_colors(traced: Scene, ink: Ink) -> FloatArray:
-    """Return the colour of the pen whose mixture with the paper is nearest, at each pixel.
-
-    Shape (height, width, 3).
-    """
-    pens = np.unique(traced.colors, axis=0)
-    paper = _paper(ink)
-    away = [((ink.shown - paper - ink.cover[..., None] * (pen - paper)) ** 2).sum(axis=2) for pen in pens]
-    return np.asarray(pens[np.argmin(away, axis=0)], np.float32)
-
-
 def pen_names(scene: Scene) -> tuple[str, ...]:
     """Return the names of the pens' layers."""
     shown: IndexArray = np.unique(scene.layer, return_index=True)[1]
@@ -175,40 +205,24 @@ def pen_names(scene: Scene) -> tuple[str, ...]:
     return tuple(f"pen-{number}-{color.tobytes().hex()}" for number, color in enumerate(colors, 1))
 
 
-class Filled(NamedTuple):
-    """Fills, and their grid."""
-
-    scene: Scene
-    """``layer`` is the pen of each."""
-    per_pixel: float
-    """View box units per pixel."""
-
-
-def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -> Filled:
-    """Trace the areas of line art as a drawing, in the colours of their pens.
+def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -> tuple[Scene, float]:
+    """Trace the areas of line art, in the colours of their pens, and return them and their grid.
 
     ``finest``: most view box units per pixel.
     """
-    scene, per_pixel = traced.scene.take(np.zeros(0, np.intp)), 1.0
-    if traced.areas is None:
-        return Filled(scene, per_pixel)
-    pens = np.unique(traced.area_pens).tolist()
+    assert traced.areas is not None
+    scenes, grids, pens = [], [], np.unique(traced.area_pens).tolist()
     for number, pen in enumerate(pens):
         own = np.append(False, traced.area_pens == pen)[traced.areas.labels]
+        ink = np.zeros((*own.shape, 4), np.float32)
         # A pixel beside an area may be covered by its edge.
-        near = cv2.dilate(own.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        ink = np.zeros((*near.shape, 4), np.float32)
-        ink[..., 3] = np.where(near, traced.areas.cover, 0)
+        ink[..., 3] = np.where(dilated(own, 3), traced.areas.cover, 0)
         found = trace(ink)
-        drawing = Drawing(found.scene, found.joints)
         part = run.part(number / len(pens), (number + 1) / len(pens))
-        done = finish_drawing(ink, drawing, part, finest=finest, tidy=tidy)
+        done = finish_drawing(ink, Drawing(found.scene, found.joints), part, finest=finest, tidy=tidy)
         shapes, count = done.drawing.scene, len(done.drawing.scene)
-        shapes = replace(
-            shapes,
-            layer=np.full(count, pen, np.int32),
-            colors=np.repeat(traced.pens[pen][None], count, axis=0),
-            opacities=np.ones(count, np.float32),
-        )
-        scene, per_pixel = scene.append(shapes), max(per_pixel, done.per_pixel)
-    return Filled(scene, per_pixel)
+        colors = np.repeat(traced.pens[pen][None], count, axis=0)
+        layer, opacities = np.full(count, pen, np.int32), np.ones(count, np.float32)
+        scenes.append(replace(shapes, layer=layer, colors=colors, opacities=opacities))
+        grids.append(done.per_pixel)
+    return functools.reduce(Scene.append, scenes), max(grids)

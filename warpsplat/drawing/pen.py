@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.line_art import lengths_of, line_settings, with_equal_widths
-from warpsplat.drawing.strokes.ink import Ink
+from warpsplat.drawing.line_art import STROKE_STEPS, lengths_of, line_settings, with_equal_widths
+from warpsplat.drawing.prices import CUBIC, LINE, MOVE
+from warpsplat.drawing.strokes.broad import OFF
+from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.lines import trace_ink
-from warpsplat.drawing.strokes.ridges import FAINT, across, middles, with_thin
 from warpsplat.drawing.trace.grids import at_pixels
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Problem, Run
@@ -22,15 +23,10 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.data import cubic_rows
+from warpsplat.svg.sizes import PATH
 
 MARGIN = 3
 """Clear pixels around a shape."""
-
-STEPS = 240
-"""Steps in which strokes are fitted to the shape."""
-
-OFF = 0.2
-"""Most by which the outlines of strokes are off in the mean [px]."""
 
 SPOT, SPOT_SIDE = 1.5, 5
 """Area that differs in a square of some side [px], at most [px²]: at wide blunt ends more does."""
@@ -40,9 +36,6 @@ LONG = 1.5
 
 SLENDER = 17.0
 """Square of the outline's length over the area of what may be strokes, at the least: a square has 16."""
-
-LEVEL, STRAIGHT = 0.2, 0.15
-"""Differences of the ends of level lines, and of lines from curves, that do not count [px]."""
 
 Flags = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float64]
@@ -79,14 +72,14 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     shown = render(replace(alone, colors=black, opacities=solid), backend=run.backend)
     cover = 1 - shown[..., 0]
     mask = with_thin(cover > 0.5, middles(across(cover), FAINT))
-    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene
+    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene()
     if not len(traced):
         return shape
     traced = replace(
         traced, canvas=canvas, layer=np.zeros_like(traced.layer), colors=np.zeros_like(traced.colors)
     )
     quiet = replace(run, on_progress=None, checkpoint=None)
-    problem = Problem(shown, replace(line_settings(settings, len(traced)), iterations=STEPS))
+    problem = Problem(shown, replace(line_settings(settings, len(traced)), iterations=STROKE_STEPS))
     strokes = _clean(fit(problem, quiet, Start(scene=traced)).scene)
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     # What a part covers of the pixels beside its mask belongs to it.
@@ -94,13 +87,14 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     parts: IndexArray = np.asarray(grown, np.intp)
     part, outline_part = _parts_of(parts, count, strokes), _parts_of(parts, count, alone)
     lengths = lengths_of(strokes)
-    pieces = (np.diff(strokes.starts) - 1 + strokes.closed) // 3
     length: Floats = np.bincount(part, lengths, count).astype(np.float64)
     area = np.bincount(part, lengths * strokes.widths, count)
-    curves = np.bincount(part, pieces, count)
-    before = np.bincount(outline_part, np.diff(alone.starts) // 3, count)
+    then, before = (
+        np.bincount(owner, sizes, count)
+        for owner, sizes in ((part, PATH + _sizes(strokes)), (outline_part, _sizes(alone)))
+    )
     off = render(strokes, backend=run.backend)[..., 0] - shown[..., 0]
-    gone = _are_near(parts, off, length) & (length * length > LONG * area) & (curves <= before)
+    gone = _are_near(parts, off, length) & (length * length > LONG * area) & (then <= before)
     gone[0] = False
     chosen = np.flatnonzero(gone[part])
     if not len(chosen):
@@ -121,17 +115,29 @@ def _clean(strokes: Scene) -> Scene:
     """Return fitted strokes with equal widths, and with straight and level lines where they nearly are."""
     strokes = with_equal_widths(strokes)
     points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
-    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
-    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
-    near_line = np.maximum(*across) < STRAIGHT * np.maximum(hypot(*chord.T), 1e-9)
-    first, last = rows[near_line][:, [0, 3]].T
+    first, last = rows[_is_straight(points, rows)][:, [0, 3]].T
     for axis in (0, 1):
-        near = np.abs(points[first, axis] - points[last, axis]) < LEVEL
+        near = np.abs(points[first, axis] - points[last, axis]) < OFF
         mean = (points[first[near], axis] + points[last[near], axis]) / 2
         points[first[near], axis] = points[last[near], axis] = mean
     a, b = points[first], points[last]
     points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
     return replace(strokes, points=points.astype(np.float32))
+
+
+def _is_straight(points: Floats, rows: IndexArray) -> Flags:
+    """Return which cubics lines are near."""
+    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
+    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
+    return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
+
+
+def _sizes(scene: Scene) -> Floats:
+    """Return the bytes of the data of each contour, shape (contour,)."""
+    rows = cubic_rows(scene)
+    pieces = np.where(_is_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
+    owner = np.searchsorted(scene.starts, rows[:, 0], side="right") - 1
+    return np.asarray(MOVE + np.bincount(owner, pieces, len(scene.starts) - 1), np.float64)
 
 
 def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:

@@ -20,7 +20,7 @@ def drawn(paths: str, width: int = 96, height: int = 72, ground: str = "#fff") -
 
 def traced(image: FloatArray) -> Scene:
     """The strokes of line art."""
-    return trace_ink(find_ink(image)).scene
+    return trace_ink(find_ink(image)).scene()
 
 
 CROSS = '<path d="M20 12L76 60"/><path d="M22 58L78 16"/>'

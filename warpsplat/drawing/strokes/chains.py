@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpsplat.drawing.strokes.skeleton import Edge, Graph
-from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
+from warpsplat.drawing.strokes.skeleton import Edge, Graph, contracted
+from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.portable.elementary import arctan2, exp, hypot
 from warpsplat.portable.sequences import convolve, interp
@@ -23,7 +23,6 @@ End = tuple[int, int]
 
 REACH = 4.0  # length of line that tells in which direction it leaves a junction, over half the ink's width
 BENT = 1.3  # length of line beside a junction that the other lines there bend, over the same
-FORKED = 1.0  # the same at a free end, where the corners of the outline bend it
 SMOOTH = 1.2  # [px] standard deviation of the filter that takes the pixels' steps off a centre line
 
 
@@ -148,28 +147,19 @@ def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
     return early + pairs, cost + sum(costs[pair] for pair in early)
 
 
-def traced(graph: Graph, edges: list[Edge], radii: Floats) -> tuple[Floats, Floats, bool] | None:
-    """Return points and widths along a chain, and whether it is a ring; None where there is too little of it.
-
-    Args:
-        graph: Of the edges.
-        edges: A chain.
-        radii: Half the width of the ink at each pixel.
-    """
+def traced(graph: Graph, edges: list[Edge]) -> tuple[Floats, bool] | None:
+    """Return points along a chain of edges, and whether it is a ring; None if there is too little of it."""
     parts = [_unbent(graph, edge) for edge in edges]
     points = np.concatenate(parts)
-    widths = 2 * at_pixels(radii, points)
     first = edges[0].nodes[0]
     closed = first == edges[-1].nodes[1] and len(parts[0]) > 0 and _is_smooth_ring(graph, edges)
     if not closed:
         start, end = edges[0].points[0], edges[-1].points[-1]
         if len(points) > 3:
-            radius = float(np.median(widths)) / 2
+            radius = float(np.median([edge.half_width for edge in edges]))
             start, end = _ahead(points, start, radius), _ahead(points[::-1], end, radius)
         points = np.concatenate([start[None], points, end[None]])
-        empty = np.full(2, 2 * float(graph.radii[first]))
-        widths = np.pad(widths, 1, mode="edge") if len(widths) else empty
-    return smoothed(points, widths, closed) if len(points) > 1 else None
+    return smoothed(points, closed=closed) if len(points) > 1 else None
 
 
 def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
@@ -195,7 +185,7 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
     """Return the points of an edge that no junction bends, without its nodes: means of several pixels."""
     along = arc_lengths(edge.points)
     total = along[-1]
-    reach = {1: FORKED, 2: 0.0}
+    reach = {1: 1.0, 2: 0.0}  # at a free end the corners of the outline bend it
     before, after = (reach.get(len(graph.at[node]), BENT) * float(graph.radii[node]) for node in edge.nodes)
     if before + after > 0.8 * total:
         scale = 0.8 * total / max(before + after, 1e-9)
@@ -204,25 +194,74 @@ def _unbent(graph: Graph, edge: Edge) -> Floats:
     return np.asarray(edge.points[inner & (along >= before) & (along <= total - after)])
 
 
-def smoothed(points: Floats, widths: Floats, closed: bool) -> tuple[Floats, Floats, bool]:
+def smoothed(points: Floats, *, closed: bool) -> tuple[Floats, bool]:
     """Return a line with one point a pixel, without the steps of pixels; and whether it is still closed."""
     if closed and hypot(*(points[0] - points[-1])) > 1e-6:
-        points, widths = np.concatenate([points, points[:1]]), np.concatenate([widths, widths[:1]])
+        points = np.concatenate([points, points[:1]])
     along = arc_lengths(points)
-    total = float(along[-1])
-    at = np.linspace(0, total, max(2, round(total) + 1))
+    at = np.linspace(0, float(along[-1]), max(2, round(float(along[-1])) + 1))
     even = np.stack([interp(at, along, points[:, axis]) for axis in (0, 1)], axis=1)
-    wide = interp(at, along, widths)
     if closed:
-        even, wide = even[:-1], wide[:-1]
+        even = even[:-1]
     if len(even) < 4:
-        return even, wide, closed and len(even) > 2
+        return even, closed and len(even) > 2
     reach = min(round(3 * SMOOTH), len(even) - 1)
     kernel = exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH) ** 2)
-    kernel /= kernel.sum()
     if closed:
         padded = np.concatenate([even[-reach:], even, even[:reach]])
     else:  # mirrored at the ends, which so stay where they are
         padded = np.pad(even, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
-    smooth = np.stack([convolve(padded[:, axis], kernel) for axis in (0, 1)], axis=1)
-    return smooth, wide, closed
+    return np.stack([convolve(padded[:, axis], kernel / kernel.sum()) for axis in (0, 1)], axis=1), closed
+
+
+def with_crossings(graph: Graph) -> Graph:
+    """Return a skeleton in which lines that cross meet in one node each."""
+    while True:
+        used: set[int] = set()
+        overlaps = []
+        for number in np.argsort([edge.length() for edge in graph.edges], kind="stable").tolist():
+            edge = graph.edges[number]
+            if used.isdisjoint(edge.nodes) and _is_overlap(graph, number):
+                overlaps.append(number)
+                used.update(edge.nodes)
+        if not overlaps:
+            return graph
+        graph = contracted(graph, overlaps)
+
+
+def _is_overlap(graph: Graph, number: int) -> bool:
+    """Return whether the lines that meet at both ends of an edge bend less, and end less often, without it.
+
+    Together they must cover it.
+    """
+    edge = graph.edges[number]
+    a, b = edge.nodes
+    if a == b or min(len(graph.at[a]), len(graph.at[b])) < 3:
+        return False
+    sides = [[_arm(graph, end, node) for end in ends_at(graph, node) if end[0] != number] for node in (a, b)]
+    together = sides[0] + sides[1]
+    pairs, cost = joined_arms(together, [0] * len(together))
+    own = [arm_of(edge, end, float(graph.radii[node])) for end, node in enumerate((a, b))]
+    apart = sum(
+        joined_arms([arm, *side], [0] * (len(side) + 1))[1] for arm, side in zip(own, sides, strict=True)
+    )
+    return cost + END <= apart and _are_covering(together, pairs, edge)
+
+
+def _arm(graph: Graph, end: tuple[int, int], node: int) -> Arm:
+    return arm_of(graph.edges[end[0]], end[1], float(graph.radii[node]))
+
+
+def _are_covering(arms: list[Arm], pairs: Pairs, edge: Edge) -> bool:
+    """Return whether the lines that join ``pairs`` of arms cover an edge with their ink at all its points."""
+    away = np.full(len(edge.points), np.inf)
+    for i, j in pairs:
+        away = np.minimum(away, _distances(edge.points, arms[i].place, arms[j].place))
+    return bool((away <= edge.half_width + 1).all())
+
+
+def _distances(points: Floats, start: Floats, end: Floats) -> Floats:
+    """Return the distance of each point from a line of two ends."""
+    way = end - start
+    share = np.clip(((points - start) * way).sum(axis=1) / max(float((way * way).sum()), 1e-9), 0, 1)
+    return np.asarray(hypot(*(points - start - share[:, None] * way).T))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.strokes.ridges import FAINT, NOISY, SURE, across, middles, with_thin
 from warpsplat.drawing.trace.grids import Bools, dilated, eroded
 from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
@@ -34,31 +34,17 @@ class Ink:
         return replace(self, mask=self.mask & ~covered, cover=cover)
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """Thresholds that tell ink from specks and textures."""
-
-    seed: float
-    """Contrast that a line must reach somewhere, over that of strong ink."""
-    share: float
-    """Share of a piece of ink that must have this contrast."""
-    speck: float
-    """Area of the smallest piece of ink, over the square of a line's width."""
-    full: float
-    """Least contrast of full ink, over that of strong ink."""
-
-
-PLAIN = _Limits(seed=0.35, share=0.0, speck=0.7, full=0.9)
-TEXTURED = _Limits(seed=0.45, share=0.6, speck=4.0, full=0.7)
-"""Thresholds for a coloured image, where crayons leave a texture."""
+SEED = 0.35  # contrast that a line must reach somewhere, over that of strong ink
+FULL = 0.9  # least contrast of full ink, over that of strong ink
+SPECK = (
+    4.0  # area of the smallest piece of faint ink, over the square of a line's width; of holes one over it
+)
 
 FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 """Least contrast of ink with the paper around it, in [0, 1], and in standard deviations of the noise."""
 
 DARK = 0.6  # contrast of a small dot that is no dirt, over that of strong ink
-NOISELESS = 0.01  # standard deviation of the noise up to which nothing is blurred
-STRONGEST_WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
-FULL_WINDOW = 31  # [px] side of the window in which there is full ink
+WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
 
 
 def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
@@ -73,31 +59,27 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     light = 1 - shown if paper.mean() < 0.4 else shown
     small = _reduced(light)
     is_textured = _is_colored_in(small)
-    limits = TEXTURED if is_textured else PLAIN
     contrast = _contrast(light, small, in_all=is_textured)
     noise = _noise(contrast)
-    if noise > NOISELESS:
-        contrast = filters.gaussian_blur(contrast, 0.8)
-        noise *= 0.5
     floor = max(FAINTEST, FAINTEST_NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
     contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed, alone=mixed)
-    seed = max(floor, limits.seed * strong)
-    strongest = cv2.dilate(contrast, np.ones((STRONGEST_WINDOW, STRONGEST_WINDOW), np.uint8))
+    seed = max(floor, SEED * strong)
+    strongest = cv2.dilate(contrast, np.ones((WINDOW, WINDOW), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(strongest, seed), floor)
     seeds = contrast > seed
     if not is_textured:
         mass = across(contrast / np.float32(strong))
-        grain = NOISY * noise / strong
-        mask = with_thin(mask, middles(mass, max(FAINT, grain)))
-        seeds |= mass > max(SURE, 2 * grain)
+        faint = max(FAINT, FAINTEST_NOISE * noise / strong)
+        mask = with_thin(mask, middles(mass, faint))
+        seeds |= mass > 2 * faint
     sure = contrast > (np.inf if is_textured else DARK * strong)
-    mask = _without_specks(mask, seeds, sure, limits)
-    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((FULL_WINDOW, FULL_WINDOW), np.uint8))
+    mask = _without_specks(mask, seeds, sure, is_textured=is_textured)
+    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((LEAST_BROAD, LEAST_BROAD), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(filters.box_blur(full, STRONGEST_WINDOW), limits.full * strong)
-    cover = np.where(dilated(mask, 5), np.clip((contrast - 0.5 * floor) / (full - 0.5 * floor), 0, 1), 0)
+    full = np.maximum(filters.box_blur(full, WINDOW), FULL * strong)
+    cover = np.where(dilated(mask, 5) & (contrast > 0.5 * floor), np.clip(contrast / full, 0, 1), 0)
     cover[eroded(mask, 5)] = 1
     return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper, is_textured)
 
@@ -155,9 +137,6 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
-SOLID = 0.9  # contrast with the image's paper from which on what is broad is ink, over that of lines
-
-
 def _with_solid(
     contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool, alone: bool
 ) -> FloatArray:
@@ -170,8 +149,9 @@ def _with_solid(
     lines = contrast > 0.5 * strong
     if not lines.any() and not alone:
         return contrast
-    solid = whole > SOLID * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
-    return np.asarray(np.where(solid, np.maximum(contrast, whole), contrast), np.float32)
+    solid = whole > FULL * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
+    # With its edge, whose pixels are mixed.
+    return np.asarray(np.where(dilated(solid, 3), np.maximum(contrast, whole), contrast), np.float32)
 
 
 TINT, TINTED = 0.05, 0.05
@@ -193,22 +173,86 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-SMALLEST = 3.0  # [px] of a piece of ink
-SMALLEST_DARK = 2  # [px] of a dark one
+SMALLEST = 2  # [px] of a piece of dark ink, and of a hole
 
 
-def _without_specks(mask: Bools, seeds: Bools, dark: Bools, limits: _Limits) -> Bools:
-    """Return the parts of ``mask`` with enough seeds that are no specks, or ``dark``, without pinholes."""
+def _without_specks(mask: Bools, seeds: Bools, dark: Bools, *, is_textured: bool) -> Bools:
+    """Return the parts of ``mask`` with seeds that are no specks, or ``dark``, without pinholes.
+
+    If paper ``is_textured`` most of a part must be seeds.
+    """
     edge = mask & ~eroded(mask, 3)
     width = 2 * float(mask.sum()) / max(1, int(edge.sum()))
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     sizes = stats[:, cv2.CC_STAT_AREA]
-    held = sizes >= max(SMALLEST, limits.speck * width * width)
-    held |= (np.bincount(parts[dark], minlength=len(sizes)) > 0) & (sizes >= SMALLEST_DARK)
-    held &= np.bincount(parts[seeds], minlength=len(sizes)) > limits.share * sizes
+    held = sizes >= SPECK * width * width
+    held |= (np.bincount(parts[dark], minlength=len(sizes)) > 0) & (sizes >= SMALLEST)
+    held &= np.bincount(parts[seeds], minlength=len(sizes)) > 0.5 * is_textured * sizes
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
-    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, 0.5 * PLAIN.speck * width * width)
+    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, width * width / SPECK)
     pinholes[0] = False
     return np.asarray(inked | pinholes[parts], np.bool_)
+
+
+SPREAD = 0.8  # [px] standard deviation of the filter by which ink across lines is measured
+
+FAINT = 0.12
+"""Ink across a line from which on it goes on; it must have twice as much somewhere [px of full ink]."""
+
+MIDDLE = 0.5  # share that the middle of a line has of the largest amount beside it
+LONG = 5  # [px] of a thin line that goes on from one place only, at the least
+
+
+def across(ink: FloatArray, fine: int = 1) -> FloatArray:
+    """Return how much ink lies across a thin line through each pixel [px of full ink]; nothing beside lines.
+
+    A line of mass m that is blurred to s has the second derivative -m / (sqrt(2 pi) s^3) in its middle.
+
+    Args:
+        ink: Share of full ink, shape (height, width).
+        fine: Pixels of the result on a pixel's side.
+
+    Returns:
+        Shape (fine * height, fine * width); less than their width in broader lines.
+    """
+    if fine > 1:
+        ink = filters.resize_cubic(ink, (ink.shape[1] * fine, ink.shape[0] * fine))
+    soft = filters.gaussian_blur(ink, SPREAD * fine, "replicate")
+    padded = np.pad(soft, 1, mode="edge")
+    middle = padded[1:-1, 1:-1]
+    xx = padded[1:-1, 2:] - 2 * middle + padded[1:-1, :-2]
+    yy = padded[2:, 1:-1] - 2 * middle + padded[:-2, 1:-1]
+    xy = 0.25 * (padded[2:, 2:] + padded[:-2, :-2] - padded[2:, :-2] - padded[:-2, 2:])
+    bend = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
+    spread = fine * math.sqrt(SPREAD * SPREAD + 1 / 12)  # with that of the pixels
+    scale = math.sqrt(2 * math.pi) * spread * spread * spread / fine
+    return np.asarray(np.maximum(-bend, 0) * scale, np.float32)
+
+
+def middles(mass: FloatArray, least: float, fine: int = 1) -> Bools:
+    """Return the pixels in the middle of lines with at least so much ink across; arguments as ``across``."""
+    most = cv2.dilate(mass, np.ones((2 * fine + 1, 2 * fine + 1), np.uint8))
+    return np.asarray((mass > least) & (mass > MIDDLE * most), np.bool_)
+
+
+def with_thin(mask: Bools, thin: Bools, fine: int = 1) -> Bools:
+    """Add thin lines to a mask that go on where it ends, or that are long; not the tips of its corners.
+
+    Args:
+        mask: Of ink, shape (height, width).
+        thin: Middles of lines, shape (height, width).
+        fine: Pixels of both on a pixel's side.
+    """
+    _, parts = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    count, links, stats, _ = cv2.connectedComponentsWithStats((thin & ~mask).astype(np.uint8), connectivity=8)
+    rows, columns = np.nonzero(links)
+    padded = np.pad(parts, 1)
+    beside = np.stack([padded[rows + down, columns + right] for down in range(3) for right in range(3)])
+    pairs = np.stack([np.broadcast_to(links[rows, columns], beside.shape), beside], axis=-1).reshape(-1, 2)
+    pairs = np.unique(pairs[pairs[:, 1] > 0], axis=0)
+    held = np.bincount(pairs[:, 0], minlength=count) > 1
+    held |= stats[:, cv2.CC_STAT_AREA] >= LONG * fine * fine
+    held[0] = False
+    return np.asarray(mask | held[links], np.bool_)

@@ -1,34 +1,59 @@
-"""Line art -> a scene of strokes."""
+"""Ink -> strokes along its centre lines, each with the width and the colour of its pen."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from warpsplat.drawing.strokes.areas import Areas
-from warpsplat.drawing.strokes.centerlines import CenterLine, find_lines
-from warpsplat.drawing.strokes.ink import Ink
-from warpsplat.drawing.strokes.pens import width_steps
-from warpsplat.drawing.trace.curves import Pieces, fit_polylines
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.strokes.broad import Areas, Split, distance_from, split
+from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced, with_crossings
+from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
+from warpsplat.drawing.strokes.pens import find_pens, line_colors
+from warpsplat.drawing.strokes.skeleton import find_graph
+from warpsplat.drawing.trace.curves import fit_polylines
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, at_pixels, dilated, eroded, nearest_in
+from warpsplat.drawing.trace.polylines import arc_lengths
 from warpsplat.drawing.trace.spans import Polyline
+from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
 DOUBT = np.ones((1, 1), np.float32)  # how far off centre lines are at corners, anywhere [px]
-TOLERANCE = 0.45  # [px] largest distance of a centre line from its curve
-THINNEST, LONG = 0.3, 6.0
-"""Width of a thin stroke, at the least, if it is so long [px]; otherwise one pixel."""
+TOLERANCE = 0.4  # [px] largest distance of a centre line from its curve
+THINNEST = 0.3  # [px] width of a stroke, at the least; of crayons one pixel
+FINE = 1100  # [px] longer side of an image up to which its ink is thinned at twice the size
+
+
+@dataclass(frozen=True)
+class CenterLine:
+    """A line drawn without lifting the pen."""
+
+    points: Floats
+    """Places on the centre line [px], shape (point, 2); the first one of a ring is not repeated."""
+    closed: bool
+    pen: int
+    """Row of the pens' colours."""
+    width: float = 0.0
+    """[px]"""
+
+    def polyline(self) -> Polyline:
+        """Return the line as curves are fitted to it."""
+        if self.closed:
+            return Polyline(self.points, True)
+        return Polyline(self.points[1:-1], False, self.points[0], self.points[-1])
 
 
 @dataclass(frozen=True)
 class TracedLines:
     """Traced line art."""
 
-    scene: Scene
-    """Strokes; ``layer`` is the pen of each."""
+    lines: list[CenterLine]
+    """Ordered by their pens."""
+    canvas: Canvas
     pens: FloatArray
     """sRGB in [0, 1], shape (pen, 3)."""
     areas: Areas | None
@@ -36,93 +61,125 @@ class TracedLines:
     area_pens: Ints
     """The pen of each area."""
 
-
-@dataclass(frozen=True)
-class _Stroke:
-    """A line, or a part of one, of one width."""
-
-    points: Floats
-    closed: bool
-    width: float
-    pen: int
-
-    def polyline(self) -> Polyline:
-        if self.closed:
-            return Polyline(self.points, True)
-        return Polyline(self.points[1:-1], False, self.points[0], self.points[-1])
+    def scene(self) -> Scene:
+        """Return the lines as opaque strokes; ``layer`` is the pen of each."""
+        runs = [line.polyline() for line in self.lines]
+        fitted = fit_polylines(runs, [TOLERANCE] * len(runs), DOUBT)
+        # Closed chains do not repeat their first point.
+        chains = [
+            np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][line.closed :]])
+            for line, pieces in zip(self.lines, fitted, strict=True)
+        ]
+        count, owner = len(chains), np.array([line.pen for line in self.lines], np.int32)
+        return Scene(
+            self.canvas,
+            np.full(count, Kind.STROKE, np.int32),
+            starts_of(np.array([len(points) for points in chains], np.int64)),
+            np.full(count, Basis.CUBIC, np.int32),
+            points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
+            closed=np.array([line.closed for line in self.lines], np.int32),
+            colors=self.pens[owner].reshape(-1, 3),
+            opacities=np.ones(count, np.float32),
+            widths=np.array([line.width for line in self.lines], np.float32),
+            layer=owner,
+        )
 
 
 def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> TracedLines:
-    """Trace the centre lines of ink as opaque strokes, with a layer for each pen.
+    """Find the centre lines of ink, and their pens; through junctions they go straight on.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas, which are not traced.
         only_lines: Whether it has no broad parts, however wide it is.
     """
-    found = find_lines(ink, mixed=mixed, only_lines=only_lines)
-    strokes = [stroke for line in found.lines for stroke in _strokes(line, thin=not ink.textured)]
-    strokes.sort(key=lambda stroke: stroke.pen)
-    fitted = fit_polylines([stroke.polyline() for stroke in strokes], [TOLERANCE] * len(strokes), DOUBT)
+    parts = Split(ink) if only_lines else split(ink, mixed=mixed)
+    fine = 2 if max(ink.mask.shape) <= FINE else 1
+    graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
+    graph = with_crossings(graph)
+    places: list[list[Floats]] = [
+        [edge.points / fine for edge in graph.edges],
+        parts.rings,
+        parts.areas.places() if parts.areas else [],
+        [dot.place[None] for dot in parts.dots],
+    ]
+    pens, owners = find_pens(*line_colors(list(chain.from_iterable(places)), ink))
+    bounds = np.cumsum([len(some) for some in places])[:-1]
+    edge_pens, ring_pens, area_pens, dot_pens = np.split(owners, bounds)
+    away = None if parts.apart is None else distance_from(parts.apart)
+    lines: list[CenterLine] = []
+    for edges, pen in find_chains(graph, edge_pens):
+        line = traced(graph, edges)
+        if line is not None:
+            lines.append(CenterLine(line[0] / fine, line[1], pen))
+    lines = _measured(lines, parts.thin.cover, thinnest=1.0 if ink.textured else THINNEST)
+    if away is not None:
+        lines = [joined for line in lines for joined in _joined_to(away, line)]
+    for ring, pen in zip(parts.rings, ring_pens.tolist(), strict=True):
+        lines.append(CenterLine(*smoothed(ring, closed=True), pen, parts.width))
+    for dot, pen in zip(parts.dots, dot_pens.tolist(), strict=True):
+        lines.append(CenterLine(np.stack([dot.place] * 2), False, pen, dot.width))
     height, width = ink.mask.shape
-    scene = _scene(Canvas(width, height, ink.paper), strokes, fitted, found.pens)
-    return TracedLines(scene, found.pens, found.areas, found.area_pens)
+    lines.sort(key=lambda line: line.pen)
+    return TracedLines(lines, Canvas(width, height, ink.paper), pens, parts.areas, area_pens)
 
 
-def rejoined(before: Scene, after: Scene) -> Scene:
-    """Return ``after``, with the ends where strokes met in ``before`` as they were then, handles included.
-
-    Where a line's width changes, the caps of the broader part pull its end back and bend it.
+def _joined_to(away: Floats, line: CenterLine) -> list[CenterLine]:
+    """Return a line that reaches into the areas where it ends; none if it is just the rest of a corner.
 
     Args:
-        before: Strokes.
-        after: The same with other points.
+        away: Distance of each pixel from the areas [px], shape (height, width).
+        line: Of ink beside the areas.
     """
-    ends = np.stack([before.first[:-1], before.first[1:] - 1], axis=1)
-    handles = np.stack([ends[:, 0] + 1, ends[:, 1] - 1], axis=1)
-    is_open = before.closed[np.searchsorted(before.starts, before.first[1:]) - 1] == 0
-    ends, handles = ends[is_open].reshape(-1), handles[is_open].reshape(-1)
-    if not len(ends):
-        return after
-    _, names, count = np.unique(before.points[ends], axis=0, return_inverse=True, return_counts=True)
-    shared = count[names.reshape(-1)] > 1
-    points = after.points.copy()
-    held = np.concatenate([ends[shared], handles[shared]])
-    points[held] = before.points[held]
-    return replace(after, points=points)
+    points, width = line.points, line.width
+    if (at_pixels(away, points) <= width + 1).all():
+        return []
+    if line.closed:
+        return [line]
+    for _ in range(2):  # the end, and the other one
+        apart = float(at_pixels(away, points[-1:])[0])
+        if apart <= width + 1:
+            back = points[-1] - points[max(0, len(points) - 2 - round(2 * width))]
+            direction = back / max(float(hypot(*back)), 1e-9)
+            points = np.concatenate([points, points[-1:] + (apart + width) * direction])
+        points = points[::-1]
+    return [replace(line, points=points)]
 
 
-def _strokes(line: CenterLine, *, thin: bool) -> list[_Stroke]:
-    """Return a line in parts of one width, which may be less than a pixel if ``thin``."""
-    length = float(hypot(*np.diff(line.points, axis=0).T).sum())
-    steps = width_steps(line.widths, length / max(1, len(line.points) - 1))
-    least = THINNEST if thin and length >= LONG else 1.0
-    if len(steps) == 1:
-        return [_Stroke(line.points, line.closed, max(least, steps[0][2]), line.pen)]
-    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
-    ends = [*(low for low, _, _ in steps[1:]), len(points) - 1]
-    return [
-        _Stroke(points[low : end + 1], False, max(least, width), line.pen)
-        for (low, _, width), end in zip(steps, ends, strict=True)
-    ]
+def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> list[CenterLine]:
+    """Return lines with the widths at which they have the ink that is nearest to them.
+
+    Args:
+        lines: Of an image.
+        cover: Inked share of each pixel, shape (height, width).
+        thinnest: Width of a line, at the least [px].
+    """
+    if not lines:
+        return lines
+    owner = np.full(cover.shape, -1, np.intp)
+    for number, line in enumerate(lines):
+        columns, rows = np.clip(line.points.astype(np.intp).T, 0, np.array(cover.shape[::-1])[:, None] - 1)
+        owner[rows, columns] = number
+    nearest = owner.reshape(-1)[nearest_in(owner >= 0)]
+    ink = np.bincount(nearest.reshape(-1), cover.reshape(-1), len(lines))
+    found = []
+    for line, area in zip(lines, ink.tolist(), strict=True):
+        length = float(arc_lengths(line.points, closed=line.closed)[-1])
+        # An open line has the area of its caps, too.
+        width = (
+            area / length if line.closed else 2 * (math.sqrt(length**2 + math.pi * area) - length) / math.pi
+        )
+        found.append(replace(line, width=max(width, thinnest)))
+    return found
 
 
-def _scene(canvas: Canvas, strokes: list[_Stroke], fitted: list[Pieces], pens: FloatArray) -> Scene:
-    """Return strokes as a ``Scene``, in which closed chains do not repeat their first point."""
-    chains = [
-        np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][stroke.closed :]])
-        for stroke, pieces in zip(strokes, fitted, strict=True)
-    ]
-    owner = np.array([stroke.pen for stroke in strokes], np.int32)
-    return Scene(
-        canvas,
-        np.full(len(strokes), Kind.STROKE, np.int32),
-        starts_of(np.array([len(points) for points in chains], np.int64)),
-        np.full(len(strokes), Basis.CUBIC, np.int32),
-        points=np.concatenate([*chains, np.zeros((0, 2))]).astype(np.float32),
-        closed=np.array([stroke.closed for stroke in strokes], np.int32),
-        colors=pens[owner].reshape(-1, 3),
-        opacities=np.ones(len(strokes), np.float32),
-        widths=np.array([stroke.width for stroke in strokes], np.float32),
-        layer=owner,
-    )
+def _enlarged(ink: Ink, factor: int) -> Bools:
+    """Return the ink's mask at ``factor`` times the size, with its edge where half a pixel is covered."""
+    size = (ink.mask.shape[1] * factor, ink.mask.shape[0] * factor)
+    cover = filters.resize_cubic(ink.cover, size)
+    held = np.kron(dilated(ink.mask, 3), np.ones((factor, factor), np.bool_))
+    inked = ((cover > 0.5) & held) | eroded(np.kron(ink.mask, np.ones((factor, factor), np.bool_)), 3)
+    if ink.textured:
+        return inked
+    thin = middles(across(ink.cover, factor), FAINT, factor)
+    return with_thin(inked, thin & held, factor)

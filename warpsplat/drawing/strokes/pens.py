@@ -9,15 +9,9 @@ from warpsplat.drawing.trace.grids import Floats, Ints, at_pixels
 from warpsplat.portable.filters import lab
 from warpsplat.scene import FloatArray
 
-WHOLE = 0.85  # cover of a line's pixels from which on they have its colour
-LEAST_COVER = 0.1  # cover from which on its colour can be told
 ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
 SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
 MOST = 8  # pens
-STEP, STEP_PX = 0.3, 1.0
-"""Difference of a line's widths up to which it is drawn with one, over their mean; and [px]."""
-
-SHORTEST = 4.0  # length of a part with a width of its own, over that width, at the least
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -34,12 +28,10 @@ def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
     paper = np.median(ink.shown[~ink.mask], axis=0) if not ink.mask.all() else np.ones(3)
     for number, line in enumerate(lines):
         cover = at_pixels(ink.cover, line)
-        best = cover >= np.quantile(cover, 0.7)
-        color = np.median(at_pixels(ink.shown, line[best]), axis=0)
-        share = float(np.median(cover[best]))
-        if LEAST_COVER < share < WHOLE:  # mixed with the paper, as it covers no pixel
-            color = np.clip(paper + (color - paper) / share, 0, 1)
-        colors[number] = color
+        best = cover >= np.median(cover)
+        share = np.maximum(cover[best], 0.1)[:, None]  # of the line in its pixels, besides paper
+        colors[number] = np.median(paper + (at_pixels(ink.shown, line[best]) - paper) / share, axis=0)
+    colors = np.clip(colors, 0, 1)
     return colors, np.array([len(line) for line in lines], np.float64)
 
 
@@ -53,16 +45,10 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
     if not len(colors):
         return np.zeros((0, 3), np.float32), np.zeros(0, np.intp)
     places = lab(colors) * np.array([0.5, 1, 1], np.float32)
-    total = weights.sum()
-    centers = places[_unlike(places, weights, MOST)]
-    for _ in range(5):
-        owner = _nearest(places, centers)
-        used = np.bincount(owner, weights, len(centers))
-        kept = np.flatnonzero(used >= min(SELDOM * total, used.max()))
-        means = [np.average(places[owner == pen], axis=0, weights=weights[owner == pen]) for pen in kept]
-        centers = np.array(means)[sorted(_unlike(np.array(means), used[kept], len(means)))]
-    owner = _nearest(places, centers)
-    order = np.argsort(-np.bincount(owner, weights, len(centers)), kind="stable")
+    centers = places[_unlike(places, weights)]
+    used = np.bincount(_nearest(places, centers), weights, len(centers))
+    owner = _nearest(places, centers[used >= min(SELDOM * weights.sum(), used.max())])
+    order = np.argsort(-np.bincount(owner, weights), kind="stable")
     owner = np.argsort(order, kind="stable")[owner]
     pens = [_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))]
     return np.stack(pens).astype(np.float32), owner
@@ -73,14 +59,13 @@ def _nearest(places: Floats, centers: Floats) -> Ints:
     return np.linalg.norm(places[:, None] - centers[None], axis=2).argmin(axis=1)
 
 
-def _unlike(places: Floats, weights: Floats | Ints, most: int) -> list[int]:
-    """Return the places with the largest weights that are unlike those before, up to ``most`` of them."""
+def _unlike(places: Floats, weights: Floats) -> list[int]:
+    """Return up to MOST of the places with the largest weights that are unlike those before."""
     held: list[int] = []
     for i in np.argsort(-weights, kind="stable").tolist():
-        is_new = not held or np.linalg.norm(places[held] - places[i], axis=1).min() > ALIKE
-        if is_new and len(held) < most:
+        if not held or np.linalg.norm(places[held] - places[i], axis=1).min() > ALIKE:
             held.append(i)
-    return held
+    return held[:MOST]
 
 
 def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
@@ -89,32 +74,3 @@ def _weighted_median(values: FloatArray, weights: Floats) -> Floats:
     sums = np.cumsum(weights[order], axis=0)
     middle = (sums >= 0.5 * sums[-1]).argmax(axis=0)
     return np.asarray(np.take_along_axis(values, np.take_along_axis(order, middle[None], 0), 0)[0])
-
-
-def width_steps(widths: Floats, spacing: float) -> list[tuple[int, int, float]]:
-    """Split a line where its pen's width changes: first point, last point, width of each part.
-
-    Args:
-        widths: At the points of a line [px], shape (point,).
-        spacing: Of the points [px].
-    """
-    sums = np.concatenate([[0.0], np.cumsum(widths)])
-
-    def parts(low: int, high: int) -> list[tuple[int, int]]:
-        total = sums[high] - sums[low]
-        least = max(2, round(SHORTEST * float(total) / (high - low) / max(spacing, 1e-6)))
-        cuts = np.arange(low + least, high - least + 1)
-        if len(cuts):
-            before, after = sums[cuts] - sums[low], sums[high] - sums[cuts]
-            # The cut of the least squared deviations.
-            best = (before * before / (cuts - low) + after * after / (high - cuts)).argmax()
-            cut = int(cuts[best])
-            widths_of_parts = np.median(widths[low:cut]), np.median(widths[cut:high])
-            if abs(np.subtract(*widths_of_parts)) > max(STEP_PX, STEP * np.mean(widths_of_parts)):
-                return [*parts(low, cut), *parts(cut, high)]
-        return [(low, high)]
-
-    return [
-        (low, min(high, len(widths) - 1), float(np.median(widths[low:high])))
-        for low, high in parts(0, len(widths))
-    ]

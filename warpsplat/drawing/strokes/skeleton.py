@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -9,9 +10,6 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, at_pixels, depth
 from warpsplat.portable.elementary import hypot
-
-STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
-"""Rows and columns to the neighbours of a pixel, the straight ones first."""
 
 SPUR = 1.5  # how far the ink of a burr reaches, over half the width where it begins, and a pixel
 
@@ -55,12 +53,12 @@ class Graph:
                 self.at[node].append(number)
 
 
-def find_graph(mask: Bools) -> tuple[Graph, Floats]:
-    """Return the skeleton of ``mask`` without burrs, and half the width of the ink at each pixel."""
+def find_graph(mask: Bools) -> Graph:
+    """Return the skeleton of ``mask`` without burrs."""
     inside = np.pad(mask.astype(np.uint8), 1)
     radii = np.maximum(depth(mask) - 0.5, 0.5)
     thin = cv2.ximgproc.thinning(255 * inside, thinningType=cv2.ximgproc.THINNING_GUOHALL)[1:-1, 1:-1] > 0
-    return _without_burrs(_graph(thin, radii)), radii
+    return _without_burrs(_graph(thin, radii))
 
 
 def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
@@ -68,13 +66,15 @@ def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
 
     A diagonal neighbour counts only where no straight step leads to a neighbour of both.
     """
+    # The straight steps first.
+    steps = sorted(itertools.product((-1, 0, 1), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))[1:]
     padded = np.pad(thin, 1)
     number = np.full(padded.shape, -1, np.int64)
     pixels = np.argwhere(padded)
     number[padded] = np.arange(len(pixels))
     rows, columns = pixels.T
-    found = np.stack([number[rows + down, columns + across] for down, across in STEPS], axis=1)
-    for slot, (down, across) in enumerate(STEPS[4:], 4):
+    found = np.stack([number[rows + down, columns + across] for down, across in steps], axis=1)
+    for slot, (down, across) in enumerate(steps[4:], 4):
         found[padded[rows + down, columns] | padded[rows, columns + across], slot] = -1
     return pixels - 1, [[n for n in row if n >= 0] for row in found.tolist()]
 

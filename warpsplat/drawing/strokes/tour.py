@@ -15,11 +15,8 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.scene.scene import ranges
 
-LOOK_AHEAD = 1500  # strokes of the longest part of a tour that is reversed
-FEW, BEGINS = 200, 8  # strokes up to which tours from several places are tried, and how many places
-MANY = 1500  # strokes above which a tour is improved once, and no single strokes are moved
-ROUNDS = 8  # of improving other tours, at the most
-LEAST_GAIN = 1e-6  # [canvas units] below which a tour counts as no shorter
+LOOK_AHEAD = 1500
+"""Strokes of the longest part of a tour that is reversed, and of a tour that is improved more than once."""
 
 Tour = tuple[Ints, Ints]
 
@@ -36,10 +33,9 @@ def toured(scene: Scene) -> Scene:
     for layer in np.unique(scene.layer).tolist():
         index = np.flatnonzero(scene.layer == layer)
         own = ends[:, index]
-        begins = [here, *own[0, :: max(1, -(-len(index) // BEGINS))]] if len(index) <= FEW else [here]
-        first = [_greedy(own, begin) for begin in begins]
-        first.append((np.arange(len(index)), np.zeros(len(index), np.intp)))
-        tour = min((_improved(own, tour) for tour in first), key=lambda tour: _travel(own, tour))
+        as_given = np.arange(len(index)), np.zeros(len(index), np.intp)
+        tours = (_improved(own, tour) for tour in (_greedy(own, here), as_given))
+        tour = min(tours, key=lambda tour: _travel(own, tour))
         order += index[tour[0]].tolist()
         reversed_ += tour[1].tolist()
         if len(index):
@@ -77,16 +73,11 @@ def _greedy(ends: Floats, here: Floats) -> Tour:
 
 
 def _improved(ends: Floats, tour: Tour) -> Tour:
-    """Return a tour shortened by reversing parts of it (2-opt) and moving single strokes (Or-opt)."""
-    count = len(tour[0])
-    for _ in range(ROUNDS if count <= MANY else 1):
-        before = _travel(ends, tour)
-        tour = _with_reversed_parts(ends, tour)
-        if count <= MANY:
-            tour = _with_moved_strokes(ends, tour)
-        if _travel(ends, tour) > before - LEAST_GAIN:
-            break
-    return tour
+    """Return a tour shortened by reversing parts of it (2-opt)."""
+    while True:
+        before, tour = _travel(ends, tour), _with_reversed_parts(ends, tour)
+        if len(tour[0]) > LOOK_AHEAD or not _travel(ends, tour) < before:
+            return tour
 
 
 def _with_reversed_parts(ends: Floats, tour: Tour) -> Tour:
@@ -105,31 +96,10 @@ def _with_reversed_parts(ends: Floats, tour: Tour) -> Tour:
         now += inner * hypot(*(entries[following] - exits[high]).T)
         then += inner * hypot(*(entries[following] - entries[low]).T)
         best = int((then - now).argmin())
-        if then[best] - now[best] < -LEAST_GAIN:
+        if then[best] < now[best]:
             part = slice(low, int(high[best]) + 1)
             order[part], turned[part] = order[part][::-1].copy(), 1 - turned[part][::-1]
             entries[part], exits[part] = exits[part][::-1].copy(), entries[part][::-1].copy()
-    return order, turned
-
-
-def _with_moved_strokes(ends: Floats, tour: Tour) -> Tour:
-    """Return a tour with each stroke but the first where it adds the least travel."""
-    order, turned = tour
-    for stroke in range(len(order)):
-        at = int(np.flatnonzero(order == stroke)[0])
-        if at == 0:
-            continue
-        rest, rest_turned = np.delete(order, at), np.delete(turned, at)
-        entries, exits = ends[rest_turned, rest], ends[1 - rest_turned, rest]
-        between = np.append(hypot(*(entries[1:] - exits[:-1]).T), 0.0)
-        costs = []
-        for entry, leave in (ends[:, stroke], ends[::-1, stroke]):
-            onwards = np.append(hypot(*(entries[1:] - leave).T), 0.0)
-            costs.append(hypot(*(exits - entry).T) + onwards - between)
-        is_turned, place = divmod(int(np.argmin(costs)), len(rest))
-        if costs[is_turned][place] < costs[turned[at]][at - 1] - LEAST_GAIN:
-            order = np.insert(rest, place + 1, stroke)
-            turned = np.insert(rest_turned, place + 1, is_turned)
     return order, turned
 
 
