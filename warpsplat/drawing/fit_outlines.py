@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats
+from warpsplat.drawing.crossings import Crossings
 from warpsplat.drawing.measure import Measure, Samples, is_shaded
 from warpsplat.drawing.solve import Bending, newton_step
 from warpsplat.fit.problem import Run
@@ -104,6 +105,7 @@ class OutlineFit:
         self._drawing, self._following = drawing, drawing.following()
         self._constraints = Constraints(drawing)
         self.points = self._constraints.project(drawing.scene.points.astype(np.float64))
+        self._crossings = Crossings(drawing, self.points)
         target = matching(target, drawing.scene.canvas)
         self._measure = Measure(target, drawing, self.points, run.backend, capacity)
         self.error, self._around = self._measure.error(self.points)
@@ -140,6 +142,7 @@ class OutlineFit:
         drawing = replace(self._drawing, scene=replace(self._drawing.scene, points=points.astype(np.float32)))
         self._constraints = Constraints(drawing, held)
         self.points = self._constraints.project(points)
+        self._crossings = Crossings(drawing, self.points)
         self.error, self._around = self._measure.error(self.points)
 
     def advance(self, run: Run, steps: int, far: int = 0) -> None:
@@ -161,9 +164,11 @@ class OutlineFit:
             if done <= far:
                 change = BLURRED_STEP * change
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
-            at = self._constraints.project(at + change.reshape(-1, 2))
+            at, refused = self._moved(at, change)
             error, now = self._measure.error(at)
-            damping = np.where(now <= around, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED)
+            damping = np.where(
+                (now <= around) & ~refused, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED
+            )
             around = now
             idle = 0 if done <= far or error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
@@ -184,7 +189,7 @@ class OutlineFit:
         length for all, whatever their gradients, lead out of them.
         """
         start, at, mean, square = (1 - ROAM_GAIN) * self.error, self.points, np.zeros(1), np.zeros(1)
-        rate, first, second = ROAM_RATE, 1.0, 1.0
+        rate, first, second, checked = ROAM_RATE, 1.0, 1.0, self.points
         slower = float(elementary.power(LAST_RATE / ROAM_RATE, 1 / max(steps, 1)))
         for done in range(1, steps + 1):
             rate, first, second = rate * slower, 0.9 * first, 0.999 * second
@@ -194,13 +199,22 @@ class OutlineFit:
             size = np.sqrt(square / (1 - second)) + LEAST_SIZE
             change = -rate * mean / (1 - first) / size
             at = self._constraints.project(at + freedom.times(change).reshape(-1, 2))
+            is_checked = done % LOOKS == 0 or done == steps
+            if is_checked:
+                at, _ = self._crossings.refuse(checked, at, self._constraints)
+                checked = at
             error, around = self._measure.error(at)
-            if error < self.error:
+            if is_checked and error < self.error:
                 self.points, self.error, self._around = at, error, around
             if run.over() or (done == steps // 2 and self.error > start):
                 break
         self._measure.error(self.points)
         self._measure.look()
+
+    def _moved(self, points: Floats, change: Floats) -> tuple[Floats, Flags]:
+        """Return points after a step, and the cubics that it leaves where they were."""
+        moved = self._constraints.project(points + change.reshape(-1, 2))
+        return self._crossings.refuse(points, moved, self._constraints)
 
     def _progress(self, done: int, steps: int, seconds: float) -> Progress:
         scene = self._scene()

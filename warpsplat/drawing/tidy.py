@@ -14,6 +14,7 @@ from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
 from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links
+from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import apart, applied, candidates
@@ -160,6 +161,7 @@ def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = b
     drawing, least = fit.drawing, fit.least
     samples = fit.places()
     errors = model.errors(samples, drawing.cubics())
+    crosses = crossing(drawing.cubics(), drawing.following(), drawing.contour())
     rest = fit.error - errors.sum()
     size = float(estimated_size(drawing.scene, DRAFT_GRID))
     refused = np.zeros((len(errors), 2), np.bool_)
@@ -184,10 +186,13 @@ def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = b
             change = every - errors
             around = np.sort(left.around, axis=1)
             fresh = np.concatenate([np.ones((len(around), 1), np.bool_), np.diff(around, axis=1) > 0], axis=1)
+            cross = np.zeros(len(keep), np.bool_)
+            cross[keep] = now = crossing(edited.cubics(), edited.following(), edited.contour())
             taken = (change[around] * fresh).sum(axis=1) <= left.saved * byte
+            taken &= ~(cross & ~crosses)[around].any(axis=1)
             refused[left.at[~taken], left.kind[~taken]] = True
             if taken.all():
-                drawing, samples, errors, refused = edited, moved, after, refused[keep]
+                drawing, samples, errors, refused, crosses = edited, moved, after, refused[keep], now
                 break
             left = left.take(taken)
         size -= float(left.saved.sum())
