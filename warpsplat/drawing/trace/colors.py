@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints
-
-if TYPE_CHECKING:
-    from warpsplat.drawing.trace.partition import Partition
+from warpsplat.drawing.trace.partition import Partition
+from warpsplat.drawing.trace.regions import Regions
+from warpsplat.drawing.trace.shares import ROUNDING
 
 SWEEPS = 8  # over all colours, each of which is the best one beside the others
 
 
-def with_best_colors(partition: Partition, image: Floats, least: float) -> Partition:
-    """Return a partition in which the flat colours that its pixels do not show explain them best.
+def with_best_colors(partition: Partition, regions: Regions) -> Partition:
+    """Return a partition of regions in which flat colours explain their image best, where few pixels show them.
 
-    Few pixels of a thin part are all of its colour; most of an area's are.
-
-    Args:
-        partition: Of the image.
-        image: Shape (height, width, 4) [levels].
-        least: How far off a pixel of a colour may be [levels].
+    Most pixels of an area are of its colour, but few of a thin part. Cells that are pixels do not tell what
+    these are mixed of.
     """
+    if partition.scale == 1:
+        return partition
+    image, least = regions.image, ROUNDING + regions.noise
     known, count = np.array([coloring.color for coloring in partition.colorings]), len(partition.colorings)
     flat = np.array([c.ramp is None and not c.is_band for c in partition.colorings], np.bool_)
     height, width = image.shape[:2]

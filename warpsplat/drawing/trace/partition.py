@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, components, dilated
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.shares import ROUNDING, Shares, beside_borders, find_shares
+from warpsplat.drawing.trace.shares import Shares, beside_borders, find_shares
 from warpsplat.scene.scene import numbers_in
 
 SCALES = 4, 3, 2
@@ -84,9 +83,7 @@ def find_partition(regions: Regions) -> Partition:
     labels = components(painted, fills)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = painted
-    found = Partition(labels, fills, lead, paint, regions.colorings, scale, shares.doubt)
-    # Cells that are pixels do not tell what these are mixed of.
-    return with_best_colors(found, regions.image, ROUNDING + regions.noise) if scale > 1 else found
+    return Partition(labels, fills, lead, paint, regions.colorings, scale, shares.doubt)
 
 
 def _usual(shares: Shares, at_border: Bools) -> float:

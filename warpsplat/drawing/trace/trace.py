@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight as straight_color
+from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
@@ -30,7 +31,7 @@ from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import Partition, find_partition
 from warpsplat.drawing.trace.planar import Loops, find_loops
 from warpsplat.drawing.trace.ramps import Gradients
-from warpsplat.drawing.trace.regions import find_regions
+from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.drawing.trace.stack import Layers, Outline, find_outlines
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
@@ -80,13 +81,17 @@ def trace(
     height, width = levels.shape[:2]
     regions = find_regions(levels, price, check, gradients, noise)
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA), price)
-    traced = trace_partition(find_partition(regions), may_have_ground=is_opaque, check=check)
-    target = len(regions.paint)
+
+    def outlined(regions: Regions) -> Traced:
+        partition = with_best_colors(find_partition(regions), regions)
+        return trace_partition(partition, may_have_ground=is_opaque, check=check)
+
+    traced, target = outlined(regions), len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
         # Regions of one colour may be one path, so that there may be more of them than paths.
         target = max(2, min(target - 1, int(target * most / len(traced.scene))))
         regions = fewer_regions(regions, target)
-        traced = trace_partition(find_partition(regions), may_have_ground=is_opaque, check=check)
+        traced = outlined(regions)
     return traced
 
 
