@@ -16,7 +16,7 @@ SWEEPS = 8  # over all colours, each of which is the best one beside the others
 
 
 def with_best_colors(partition: Partition, regions: Regions) -> Partition:
-    """Return a partition of regions in which flat colours explain their image best, where few pixels show them.
+    """Return a partition in which flat colours that few pixels show explain the image of its regions best.
 
     Most pixels of an area are of its colour, but few of a thin part. Cells that are pixels do not tell what
     these are mixed of.
