@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max
 
 DIRECTIONS = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 """Steps (row, column) along which neighbouring regions are looked for."""
@@ -38,6 +39,21 @@ class Mixtures:
     """The colour of the nearest region of all, shape (pixel, channel)."""
 
 
+def mixed(pixels: Floats, one: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """Return the share of the first of two colours in pixels, and how far off the mixture is [levels].
+
+    The share may be below 0 or beyond 1, though the mixture is not. All have the shape (..., channel).
+    """
+    # Channel by channel: sums along an axis of four take ten times as long.
+    pixels, one, other = (np.moveaxis(each, -1, 0) for each in (pixels, one, other))
+    between, beyond = ([a - c for a, c in zip(b, other, strict=True)] for b in (one, pixels))
+    square = sum(a * a for a in between)
+    share = np.asarray(sum(a * b for a, b in zip(beyond, between, strict=True)) / np.maximum(square, 1))
+    inside = np.clip(share, 0, 1)
+    off = functools.reduce(np.maximum, (np.abs(a - inside * b) for a, b in zip(beyond, between, strict=True)))
+    return share, off
+
+
 def unmix(
     image: Floats,
     labels: Ints,
@@ -65,7 +81,7 @@ def unmix(
     return Mixtures(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Mixtures)))
 
 
-def _neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Ints, Ints, Floats]:
+def neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Ints, Ints, Floats]:
     """Return region, index and distance of the nearest labelled pixel by direction, (direction, pixel)."""
     height, width = labels.shape
     shape = (len(DIRECTIONS), len(rows))
@@ -88,21 +104,21 @@ def _neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Int
 def _unmix(
     image: Floats, labels: Ints, fills: Floats, rows: Ints, columns: Ints, noise: float, reach: int
 ) -> Mixtures:
-    found, index, distance = _neighbours(labels, rows, columns, reach)
-    # Channel by channel: sums along an axis of four take ten times as long.
-    colors = np.ascontiguousarray(np.moveaxis(fills.reshape(-1, fills.shape[2])[index], 2, 1))
-    pixel = np.ascontiguousarray(image[rows, columns].T)
+    found, index, distance = neighbours(labels, rows, columns, reach)
+    colors = fills.reshape(-1, fills.shape[2])[index]
+    # Each channel lies together: steps of four take several times as long.
+    colors = np.moveaxis(np.ascontiguousarray(np.moveaxis(colors, 2, 0)), 0, 2)
+    pixels = np.ascontiguousarray(image[rows, columns].T).T
     count, slack = len(rows), SLACK if noise else 0.0
     best = np.full(count, np.inf, np.float32)
     residual = np.full(count, np.inf, np.float32)
     winner, share = np.zeros(count, np.int64), np.ones(count, np.float32)
     for a, b in itertools.combinations_with_replacement(range(len(DIRECTIONS)), 2):
         known = (found[a] != NO_REGION) & (found[b] != NO_REGION)
-        between = colors[a] - colors[b]
-        square = np.maximum((between**2).sum(axis=0), 1e-6)
-        t = np.clip(((pixel - colors[b]) * between).sum(axis=0) / square, 0, 1)
-        off = np.abs(pixel - colors[b] - t * between).max(axis=0)
-        off = np.maximum(off - slack * np.abs(between).max(axis=0), 0) + RESIDUAL_WEIGHT * off
+        t, off = mixed(pixels, colors[a], colors[b])
+        t = np.clip(t, 0, 1)
+        contrast = channel_max(np.abs(colors[a] - colors[b])) if slack else 0
+        off = np.maximum(off - slack * contrast, 0) + RESIDUAL_WEIGHT * off
         cost = np.where(known, off + DISTANCE_COST * (distance[a] + distance[b]), np.inf)
         better = cost < best
         best[better], residual[better] = cost[better], off[better]
@@ -111,8 +127,8 @@ def _unmix(
     each = np.arange(count)
     return Mixtures(
         label=found[winner, each],
-        color=colors[winner, :, each],
+        color=colors[winner, each],
         share=share,
         residual=residual,
-        base=colors[np.argmin(distance, axis=0), :, each],
+        base=colors[np.argmin(distance, axis=0), each],
     )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, nearest_in
-from warpsplat.drawing.trace.mixtures import DISTANCE_COST
+from warpsplat.drawing.trace.mixtures import DISTANCE_COST, mixed
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.portable import filters
 from warpsplat.scene.scene import numbers_in
@@ -178,14 +178,12 @@ def _best_pairs(regions: Regions, painted: Ints, colors: Colors, rows: Ints, col
                 colors.ramps[k][rows[some], columns[some]] if k in colors.ramps else colors.mean[k]
                 for k in (a, b)
             )
-            between, beyond = np.broadcast_to(one - other, (len(some), 4)), pixels[some] - other
-            square = np.maximum((between**2).sum(axis=1), 1e-6)
-            share = np.clip((beyond * between).sum(axis=1) / square, 0, 1)
-            residual = channel_max(np.abs(beyond - share[:, None] * between))
+            share, residual = mixed(pixels[some], one, other)
+            share = np.clip(share, 0, 1)
             cost = residual + DISTANCE_COST * (away[i] + away[j])[some]
             better = cost < best.cost[some]
             some = some[better]
             best.first[some], best.second[some], best.share[some] = a, b, share[better]
             best.residual[some], best.cost[some] = residual[better], cost[better]
-            best.contrast[some] = channel_max(np.abs(between))[better]
+            best.contrast[some] = np.broadcast_to(channel_max(np.abs(one - other)), better.shape)[better]
     return best

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -12,8 +11,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
-from warpsplat.drawing.trace.mixtures import MIXED, unmix
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
+from warpsplat.drawing.trace.mixtures import MIXED, mixed, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts
 from warpsplat.scene.scene import numbers_in
 
@@ -133,9 +132,7 @@ def _round(
             colorings.append(Coloring(thin.typical_color()))
             flat = _FlatColors.of(colorings)
         color = colorings[chosen].color
-        toward, away = color - thin.bases, thin.colors - thin.bases
-        share = (away * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1)
-        off = channel_max(np.abs(away - np.clip(share, 0, 1)[:, None] * toward))
+        share, off = mixed(thin.colors, color, thin.bases)
         own = share >= min(COVERED, COVERED_OF_MOST * float(share.max()))
         other[y, x] = own & (off > OTHER_COLOR)
         labels[y[own], x[own]] = len(paint)
@@ -198,8 +195,10 @@ def _matching_color(thin: _ThinPart, flat: _FlatColors, near: list[int], limit: 
     pixels, bases = thin.colors[top], thin.bases[top]
     most = len(pixels) - int(MATCHING * (len(pixels) - 1))  # pixels that a colour may miss
     few = slice(0, 2 * most)  # which tell of most colours that they miss too many
-    likely = np.flatnonzero((_shares(pixels[few], bases[few], flat.colors)[1] > limit).sum(axis=0) <= most)
-    share, off = _shares(pixels, bases, flat.colors[likely])
+    likely = np.flatnonzero(
+        (mixed(pixels[few, None], flat.colors, bases[few, None])[1] > limit).sum(axis=0) <= most
+    )
+    share, off = mixed(pixels[:, None], flat.colors[likely], bases[:, None])
     fits, largest = np.zeros(len(flat.colors), np.bool_), np.zeros(len(flat.colors), share.dtype)
     fits[likely] = (off > limit).sum(axis=0) <= most
     largest[likely] = share.max(axis=0)
@@ -209,24 +208,3 @@ def _matching_color(thin: _ThinPart, flat: _FlatColors, near: list[int], limit: 
     if clear.any():
         return flat.numbers[int(np.where(clear, largest, -np.inf).argmax())]
     return None if any(fits[flat.numbers.index(i)] for i in near) else flat.total
-
-
-def _shares(pixels: Floats, bases: Floats, colors: Floats) -> tuple[Floats, Floats]:
-    """Return the share of each colour in each pixel beside its base, and how far off that mixture is.
-
-    Args:
-        pixels: Shape (pixel, channel).
-        bases: What they are mixed with, shape (pixel, channel).
-        colors: Shape (color, channel).
-
-    Returns:
-        Shape (pixel, color), both.
-    """
-    # Channel by channel: sums along an axis of four take ten times as long.
-    toward = [color - base[:, None] for color, base in zip(colors.T, bases.T, strict=True)]
-    away = [channel[:, None] for channel in (pixels - bases).T]
-    along, square = (sum(a * b for a, b in zip(parts, toward, strict=True)) for parts in (away, toward))
-    share = np.asarray(along / np.maximum(square, 1))
-    inside = np.clip(share, 0, 1)
-    off = functools.reduce(np.maximum, (np.abs(a - inside * b) for a, b in zip(away, toward, strict=True)))
-    return share, off
