@@ -54,7 +54,7 @@ class Crossings:
         crosses, rounds = self.new(after), 0
         while crosses.any() and rounds < len(refused):
             around = crosses
-            for _ in range(2**rounds - 1):
+            for _ in range((1 << rounds) - 1):
                 around = around | around[self._before] | around[self._next]
             refused, rounds = refused | around, rounds + 1
             back, (first, last) = after.reshape(-1, 3, 2).copy(), (self._before[refused], self._next[refused])
