@@ -16,10 +16,10 @@ SWEEPS = 8  # over all colours, each of which is the best one beside the others
 
 
 def with_best_colors(partition: Partition, regions: Regions) -> Partition:
-    """Return a partition in which flat colours that few pixels show explain the image of its regions best.
+    """Return a partition with the flat colours of least squares where these halve the error of their pixels.
 
-    Most pixels of an area are of its colour, but few of a thin part. Cells that are pixels do not tell what
-    these are mixed of.
+    The colour of an area is seen, but no pixel may show that of a pen or a pencil. Cells that are pixels do
+    not tell what these are mixed of.
     """
     if partition.scale == 1:
         return partition
@@ -39,17 +39,23 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
     goal = _sums(pure, shown[~is_mixed], count) + _sums(paint, area[:, None] * rest[pixel], count)
     inner = np.bincount(pure, minlength=count)
     weight = inner + np.bincount(paint, area * area, count)
-    seen = np.abs(shown[~is_mixed] - known[pure]).max(axis=1, initial=0) <= least
-    whole = inner + np.bincount(paint, area, count)
-    is_vague = flat & (whole > 0) & (2 * np.bincount(pure, seen, count) < whole)
     one, other, product = _products(pixel, paint, area, count)
     first, colors = np.searchsorted(one, np.arange(count + 1)), np.where(flat[:, None], known, 0.0)
     for _ in range(SWEEPS):
-        for k in np.flatnonzero(is_vague).tolist():
+        for k in np.flatnonzero(flat & (weight > 0)).tolist():
             own = slice(first[k], first[k + 1])
             beside = (product[own, None] * colors[other[own]]).sum(axis=0)
             colors[k] = np.clip((goal[k] - beside) / weight[k], 0, 255)
-    changed = is_vague & (np.abs(colors - known).max(axis=1) > least)
+
+    def error(colors: Floats) -> Floats:
+        """Return the squared error of the pixels of each colouring, by the areas in which they show it."""
+        whole = np.square(shown[~is_mixed] - colors[pure]).sum(axis=1)
+        model = _sums(pixel, area[:, None] * colors[paint], len(mixed))
+        mix = np.square(rest - model).sum(axis=1)
+        return np.asarray(np.bincount(pure, whole, count) + np.bincount(paint, area * mix[pixel], count))
+
+    before = np.where(flat[:, None], known, 0.0)
+    changed = flat & (error(colors) < error(before) / 2) & (np.abs(colors - before).max(axis=1) > least)
     if not changed.any():
         return partition
     colorings = [
