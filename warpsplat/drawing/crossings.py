@@ -48,17 +48,18 @@ class Crossings:
     def refuse(self, before: Floats, after: Floats, constraints: Constraints) -> tuple[Floats, Flags]:
         """Return ``after``, but with ``before`` where a contour would begin to cross, and these cubics.
 
-        More and more around these is taken back until nothing crosses.
+        Half of the way is tried first; then more and more around these is taken back until nothing crosses.
         """
         refused, points, old = np.zeros(len(self._contour), np.bool_), after, before.reshape(-1, 3, 2)
-        crosses, rounds = self.new(after), 0
-        while crosses.any() and rounds < len(refused):
-            around = crosses
-            for _ in range((1 << rounds) - 1):
+        crosses, rounds, grows = self.new(after), 0, True
+        while crosses.any() and grows:
+            around = crosses | refused
+            for _ in range((1 << rounds) // 2):
                 around = around | around[self._before] | around[self._next]
-            refused, rounds = refused | around, rounds + 1
+            grows, refused, rounds = rounds < 2 or bool((around & ~refused).any()), around, rounds + 1
             back, (first, last) = after.reshape(-1, 3, 2).copy(), (self._before[refused], self._next[refused])
-            back[refused], back[first, 2], back[last, :2] = old[refused], old[first, 2], old[last, :2]
+            kept = 0.5 * (old + back) if rounds == 1 else old
+            back[refused], back[first, 2], back[last, :2] = kept[refused], kept[first, 2], kept[last, :2]
             points = constraints.project(back.reshape(-1, 2))
             crosses = self.new(points, np.bincount(self._contour, crosses)[self._contour] > 0)
         return points, refused
