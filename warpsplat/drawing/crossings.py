@@ -11,6 +11,9 @@ from warpsplat.rendering.program import launch_on_host
 PIECES = 7
 """Lines that take the place of a cubic; an odd number, as what is symmetric crosses halfway."""
 
+ROUNDS = 7
+"""Times that more and more of a step is taken back; at last whole contours stay as they were."""
+
 
 def crossing(cubics: Floats, following: Links, contour: Links, chosen: Flags | None = None) -> Flags:
     """Return which cubics, shape (cubic, 4, 2), cross others of their contours, or themselves.
@@ -51,15 +54,18 @@ class Crossings:
         Half of the way is tried first; then more and more around these is taken back until nothing crosses.
         """
         refused, points, old = np.zeros(len(self._contour), np.bool_), after, before.reshape(-1, 3, 2)
-        crosses, rounds, grows = self.new(after), 0, True
-        while crosses.any() and grows:
-            around = crosses | refused
-            for _ in range((1 << rounds) // 2):
+        crosses = self.new(after)
+        for done in range(ROUNDS):
+            if not crosses.any():
+                break
+            own = np.bincount(self._contour, crosses)[self._contour] > 0
+            around = own if done + 1 == ROUNDS else crosses
+            for _ in range((1 << done) // 2):
                 around = around | around[self._before] | around[self._next]
-            grows, refused, rounds = rounds < 2 or bool((around & ~refused).any()), around, rounds + 1
+            refused = refused | around
             back, (first, last) = after.reshape(-1, 3, 2).copy(), (self._before[refused], self._next[refused])
-            kept = 0.5 * (old + back) if rounds == 1 else old
+            kept = 0.5 * (old + back) if done == 0 else old
             back[refused], back[first, 2], back[last, :2] = kept[refused], kept[first, 2], kept[last, :2]
             points = constraints.project(back.reshape(-1, 2))
-            crosses = self.new(points, np.bincount(self._contour, crosses)[self._contour] > 0)
+            crosses = self.new(points, own)
         return points, refused
