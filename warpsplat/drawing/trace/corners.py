@@ -32,8 +32,10 @@ SIDES = 5.0, 2.0
 SIDE_SAMPLES = 9  # points of a side that tell its direction
 LEAST_SIDE = 0.5  # [px] of outline that has a direction
 MOST_OFF = 4.0  # [px] of a corner from its outline: the tips of stars are off
-MOST_AREA = 0.18  # of a pixel that a corner and its outline differ by; logos: nothing changes from 0.1 to 0.2
-SAMPLES = 17  # points of an outline beside a corner that tell these areas
+MOST_AREA = (
+    0.18  # by which a corner and its outline differ in a pixel; logos: nothing changes from 0.1 to 0.2
+)
+SAMPLES = 17  # points of an outline around a corner from which these areas are measured
 BLUNT = 3.5  # [px] of outline between two corners that may be one
 
 
@@ -114,7 +116,7 @@ def _located(lines: Polylines, peaks: Ints, blunt: Floats, doubt: Floats | None)
     """
     owner, here = np.searchsorted(lines.first, peaks, side="right") - 1, lines.along[peaks]
     total, closed = lines.totals[owner], lines.closed[owner]
-    after = _neighbours(owner)[1]
+    after = _following(owner)
     wraps = after <= np.arange(len(peaks))
     following = here[after] + np.where(wraps, total, 0)
     near = (following - here < blunt[owner]) & (following > here)
@@ -141,8 +143,8 @@ def _located(lines: Polylines, peaks: Ints, blunt: Floats, doubt: Floats | None)
     return Corners(which[order], along[order], points[order], bent[order])
 
 
-def _at(values: Floats, points: Floats) -> Floats:
-    """Return the largest of the values (height, width) of the pixels around points, shape (point,)."""
+def _mean_around(values: Floats, points: Floats) -> Floats:
+    """Return the mean of the values (height, width) of the nine pixels around points, shape (point,)."""
     height, width = values.shape
     x, y = np.floor(points).astype(np.intp).T
     around = [(y + down, x + right) for down in (-1, 0, 1) for right in (-1, 0, 1)]
@@ -174,7 +176,7 @@ def _meeting(
     best = np.full(len(owner), np.inf)
     near = lines.at(owner, middle)
     bend = np.full(len(owner), BENT[-1])
-    points, slack = near.copy(), np.zeros(len(owner)) if doubt is None else _at(doubt, near)
+    points, slack = near.copy(), np.zeros(len(owner)) if doubt is None else _mean_around(doubt, near)
     for side, bent in itertools.product(SIDES, BENT):
         begin, end = np.maximum(first - bent, (low + first) / 2), np.minimum(last + bent, (last + high) / 2)
         tips, met = _meetings(
@@ -197,7 +199,7 @@ def _with_area(outlines: Floats, tips: Floats, slack: Floats) -> Floats:
     Args:
         outlines: Shape (corner, point, 2).
         tips: Shape (corner, 2).
-        slack: By how much they may differ, shape (corner,).
+        slack: By how much each of the two pixels at a tip may be off, shape (corner,).
     """
     x, y = np.moveaxis(outlines, 2, 0)
     area = (x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1) + x[:, -1] * y[:, 0] - x[:, 0] * y[:, -1]
@@ -234,13 +236,13 @@ def _most_changed(outlines: Floats, tips: Floats) -> Floats:
     return np.abs(steps.reshape(-1, height, width).cumsum(axis=2)).max(axis=(1, 2), initial=0)
 
 
-def _neighbours(owner: Ints) -> tuple[Ints, Ints]:
-    """Return the corners before and after each one, around its polyline."""
-    number, changes = np.arange(len(owner)), np.diff(owner) != 0
+def _following(owner: Ints) -> Ints:
+    """Return the corner after each one, around its polyline."""
+    changes = np.diff(owner) != 0
     is_first, is_last = np.append(True, changes)[: len(owner)], np.append(changes, True)[: len(owner)]
-    before, after = number - 1, number + 1
-    before[is_first], after[is_last] = number[is_last], number[is_first]
-    return before, after
+    after = np.arange(1, len(owner) + 1)
+    after[is_last] = np.flatnonzero(is_first)
+    return after
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,58 @@
+"""Colours of a partition that explain the pixels of its image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpsplat.drawing.trace.assign import with_main_color
+from warpsplat.drawing.trace.colors import with_best_colors
+from warpsplat.drawing.trace.grids import NO_REGION
+from warpsplat.drawing.trace.palette import Coloring, Parts
+from warpsplat.drawing.trace.partition import find_partition
+from warpsplat.drawing.trace.regions import Regions
+
+WHITE = np.full(4, 255, np.float32)
+
+
+def grey(value: float) -> np.ndarray:
+    return np.array([value, value, value, 255], np.float32)
+
+
+def stroke(ink: float, shown: float) -> Regions:
+    """A bar of 24x5 px that is taken for one of a darker ink than its pixels show."""
+    labels = np.zeros((16, 32), np.int32)
+    labels[5:10, 4:28] = 1
+    colorings = [Coloring(WHITE), Coloring(grey(ink))]
+    fills = np.array([coloring.color for coloring in colorings])[labels]
+    image = np.where(labels[..., None] == 1, grey(shown), WHITE).astype(np.float32)
+    return Regions(image, labels, fills, np.arange(2, dtype=np.int32), colorings, 0.0)
+
+
+def colors_of(regions: Regions) -> list[float]:
+    partition = with_best_colors(find_partition(regions), regions)
+    return [float(coloring.color[0]) for coloring in partition.colorings]
+
+
+def test_ink_has_the_colour_of_its_pixels() -> None:
+    paper, ink = colors_of(stroke(0, 60))
+    assert paper == 255
+    assert abs(ink - 60) < 4
+
+
+def test_a_colour_that_pixels_show_stays() -> None:
+    assert colors_of(stroke(60, 60)) == [255, 60]
+    assert colors_of(stroke(60, 61)) == [255, 60], "rounding"
+
+
+def test_the_main_colour_is_that_of_most_area_in_all_its_parts() -> None:
+    """White in three parts, together larger than the one of ink, and a white pixel that is not labelled."""
+    labels = np.zeros((9, 22), np.int32)
+    labels[:, 10:] = np.repeat([1, 2, 3], 4)
+    colorings = [Coloring(grey(0)), Coloring(WHITE)]
+    paint = np.array([0, 1, 1, 1], np.int32)
+    labels[4, 4] = NO_REGION
+    fills = np.array([coloring.color for coloring in colorings])[paint[labels]]
+    image = fills.copy()
+    image[4, 4] = WHITE
+    found = with_main_color(image, Parts(labels, fills, paint, colorings), 0.0)
+    assert found.labels[4, 4] in (1, 2, 3)
