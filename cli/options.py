@@ -46,7 +46,7 @@ threads_option = click.option(
     "--threads",
     type=click.IntRange(min=1),
     metavar="N",
-    help="CPU threads, at most 8 per core; the result does not depend on them.  [default: all cores]",
+    help="CPU threads, at most 8 per core; the result is the same.  [default: one a core, up to 8]",
 )
 
 importance_option = click.option(

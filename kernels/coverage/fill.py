@@ -16,7 +16,7 @@ from typing import Any
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage.rows import tile_row
+from warpsplat.kernels.coverage.rows import partial_run, tile_row
 from warpsplat.kernels.tile import tile_column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
@@ -207,17 +207,21 @@ def add_piece(
     x1: wp.float32,
     height: wp.float32,
     width: wp.int32,
+    columns: wp.vec2i,
 ):
     """Add the area right of a piece of an edge that lies inside one row of pixels, in its own pixels and,
     whole, in the first on its right; the prefix sum carries it on.
 
-    ``x0``, ``x1``: its ends, right of the left border of ``slot``; ``width``: of the row of tiles [px].
+    ``x0``, ``x1``: its ends, right of the left border of ``slot``; ``width``: of the row of tiles [px];
+    ``columns``: pieces that start in other pixels of the row than these [first, last) are left out.
     """
     least = wp.min(x0, x1)
     low = wp.clamp(least, 0.0, float(width))
     most = wp.max(x0, x1)
     high = wp.min(most, float(width))
     index = int(low)
+    if index < columns[0] or index >= columns[1]:
+        return
     if low >= high or (least >= 0.0 and most <= float(index + 1)):
         # In one pixel, or wholly left or right of the shape's tiles.
         if index < width:
@@ -254,9 +258,10 @@ def add_edge(
     top: wp.int32,
     row_first: wp.int32,
     row_last: wp.int32,
+    columns: wp.vec2i,
 ):
     """Add an edge's areas in the pixel rows [row_first, row_last) of a row of tiles that starts at ``left``,
-    ``top``.
+    ``top``, but for pieces that do not start in ``columns``.
     """
     a = start
     b = end
@@ -275,7 +280,7 @@ def add_edge(
             y_next = wp.min(float(y + 1), y_bottom)
             dy = y_next - y_top
             x_next = x_top + dy * slope
-            add_piece(pixels, slot, y - top, x_top, x_next, sign * dy, width)
+            add_piece(pixels, slot, y - top, x_top, x_next, sign * dy, width, columns)
             x_top = x_next
             y_top = y_next
 
@@ -353,25 +358,24 @@ def fold_columns(
 @wp.func
 def sum_row(
     pixels: wp.array2d[wp.float32],
-    slot_state: wp.array[wp.int32],
-    slot_winding: wp.array[wp.int32],
     first: wp.int32,
     last: wp.int32,
     row: wp.int32,
     rule: wp.int32,
+    winding: wp.int32,
 ):
-    """Compute prefix sums along one row of the slots [first, last), clamped or folded."""
-    total = float(0.0)
+    """Compute prefix sums along one row of the slots [first, last), all PARTIAL, clamped or folded.
+
+    ``winding``: the winding number left of them.
+    """
+    total = float(winding)
     for s in range(first, last):
-        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
-            for x in range(constants.TILE):
-                total += pixels[s, constants.TILE * x + row]
-                value = wp.clamp(total, -1.0, 1.0)
-                if rule == constants.EVENODD:
-                    value = fold(total)
-                pixels[s, constants.TILE * x + row] = value
-        else:
-            total = float(slot_winding[s])
+        for x in range(constants.TILE):
+            total += pixels[s, constants.TILE * x + row]
+            value = wp.clamp(total, -1.0, 1.0)
+            if rule == constants.EVENODD:
+                value = fold(total)
+            pixels[s, constants.TILE * x + row] = value
 
 
 @wp.func
@@ -396,7 +400,8 @@ def keep_slopes(
 def make_forward(column: Any) -> wp.Kernel:
     """Return the kernel that computes coverages, for vectors of type ``column``.
 
-    It goes by a tile's whole columns; or, a thread each, by rows of pixels.
+    A thread has a row of tiles, by whole columns; or, where there are many threads, one row of pixels of a
+    run of PARTIAL slots in it. No edge touches the slot left of a run, whose winding number stands for it.
     """
     by_rows = column is not tile_column
     lane_rows = 1 if by_rows else constants.TILE
@@ -422,27 +427,37 @@ def make_forward(column: Any) -> wp.Kernel:
         coverage: wp.array2d[column],  # [slot_capacity, columns] in [-1, 1], signed where not ALIGNED
         coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
     ):
-        """Compute the coverage of PARTIAL slots, in rows of tiles with a visible one. One thread a row of
-        tiles of a shape (that of its leftmost slot) and lane.
+        """Compute the coverage of PARTIAL slots, in rows or runs with a visible one. One thread a row of
+        tiles of a shape (that of its leftmost slot), or a run (likewise) and lane.
         """
         i, lane = wp.tid()
         slot = offset + i
+        tiles = wp.vec2i(0, 0)
+        if by_rows:
+            tiles = partial_run(slot, slot_shape, slot_first, slot_state, shape_tiles)
+            if tiles[0] == tiles[1]:
+                return
+            slot -= tiles[0]
         row = tile_row(slot, slot_shape, slot_first, shape_tiles)
         shape = row[0]
         if shape < 0:
             return
         if part[shape] != own_part:
             return
-        end = slot + row[2]
-        if not any_visible(slot_state, slot, end):
+        if not by_rows:
+            tiles[1] = row[2]
+        first_slot = slot + tiles[0]
+        end = slot + tiles[1]
+        if not any_visible(slot_state, first_slot, end):
             return
-        for s in range(slot, end):
+        for s in range(first_slot, end):
             if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
                 for x in range(constants.TILE):
                     if by_rows:
                         coverage_pixels[s, constants.TILE * x + lane] = 0.0
                     else:
                         coverage[s, x] = column(0.0)
+        columns = constants.TILE * tiles
         top = constants.TILE * row[3]
         row_first = top + lane * lane_rows
         left = float(constants.TILE * row[1])
@@ -453,24 +468,35 @@ def make_forward(column: Any) -> wp.Kernel:
             stop = wp.min(constants.EDGE_BLOCK * (block + 1), last)
             if reach[block][0] <= float(row_first + lane_rows) and reach[block][1] >= float(row_first):
                 for j in range(first, stop):
+                    a = vertex[j]
+                    b = vertex[vertex_next[j]]
+                    if by_rows:
+                        if wp.min(a[0], b[0]) - left > float(columns[1]):
+                            continue
+                        if columns[0] > 0 and wp.max(a[0], b[0]) - left < float(columns[0]):
+                            continue
                     add_edge(
                         coverage_pixels,
                         slot,
-                        vertex[j],
-                        vertex[vertex_next[j]],
+                        a,
+                        b,
                         left,
                         constants.TILE * row[2],
                         top,
                         row_first,
                         row_first + lane_rows,
+                        columns,
                     )
             first = stop
         if by_rows:
-            sum_row(coverage_pixels, slot_state, slot_winding, slot, end, lane, rule[shape])
+            winding = int(0)
+            if first_slot > slot:
+                winding = slot_winding[first_slot - 1]
+            sum_row(coverage_pixels, first_slot, end, lane, rule[shape], winding)
         elif rule[shape] == constants.NONZERO:
             sum_columns(coverage, slot_state, slot_winding, slot, end)
         else:
             fold_columns(coverage, slot_state, slot_winding, slot, end)
-        keep_slopes(coverage_pixels, slot_state, slot, end, row_first - top, lane_rows)
+        keep_slopes(coverage_pixels, slot_state, first_slot, end, row_first - top, lane_rows)
 
     return fill_forward

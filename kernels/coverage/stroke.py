@@ -19,7 +19,7 @@ from typing import Any
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.coverage.rows import tile_row
+from warpsplat.kernels.coverage.rows import one_tile, tile_row
 from warpsplat.kernels.tile import tile_column
 
 wp.set_module_options(constants.MODULE_OPTIONS)
@@ -136,30 +136,33 @@ def overhang(
 
 
 @wp.func
-def segment_rows(a: wp.vec2, e: wp.vec2, length: wp.float32, reach: wp.float32, over: wp.vec2) -> wp.vec2:
-    """Return the lowest and highest y of the rectangle around the segment from ``a`` along the unit vector
-    ``e``.
+def box_around(a: wp.vec2, e: wp.vec2, length: wp.float32, reach: wp.float32, over: wp.vec2) -> wp.vec4:
+    """Return the lowest and highest x and y of the rectangle around the segment from ``a`` along the unit
+    vector ``e``.
     """
-    start = a[1] - over[0] * e[1]
-    end = a[1] + (length + over[1]) * e[1]
-    side = reach * wp.abs(e[0])
-    return wp.vec2(wp.min(start, end) - side, wp.max(start, end) + side)
+    start = a - over[0] * e
+    end = a + (length + over[1]) * e
+    side = reach * wp.vec2(wp.abs(e[1]), wp.abs(e[0]))
+    low = wp.min(start, end) - side
+    high = wp.max(start, end) + side
+    return wp.vec4(low[0], high[0], low[1], high[1])
 
 
 @wp.func
-def segment_ends(e: wp.vec2, length: wp.float32, over: wp.vec2) -> wp.vec3:
+def short_sides(e: wp.vec2, length: wp.float32, over: wp.vec2) -> wp.vec4:
     """Return where the rectangle's short sides meet the line at a's height, lower x first, and their slope
-    dx / dy; relative to a.
+    dx / dy; relative to a. And 1 / length^2.
     """
+    inverse = 1.0 / wp.max(length * length, TINY)
     if wp.abs(e[0]) <= FLAT:
-        return wp.vec3(-1.0e8, 1.0e8, 0.0)
+        return wp.vec4(-1.0e8, 1.0e8, 0.0, inverse)
     x0 = -over[0] / e[0]
     x1 = (length + over[1]) / e[0]
-    return wp.vec3(wp.min(x0, x1), wp.max(x0, x1), -e[1] / e[0])
+    return wp.vec4(wp.min(x0, x1), wp.max(x0, x1), -e[1] / e[0], inverse)
 
 
 @wp.func
-def segment_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
+def long_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
     """Return half of the chord between the rectangle's long sides, and their slope dx / dy."""
     if wp.abs(e[1]) <= FLAT:
         return wp.vec2(1.0e8, 0.0)
@@ -167,7 +170,7 @@ def segment_sides(e: wp.vec2, reach: wp.float32) -> wp.vec2:
 
 
 @wp.func
-def segment_span(x: wp.float32, dy: wp.float32, ends: wp.vec3, sides: wp.vec2) -> wp.vec2:
+def segment_span(x: wp.float32, dy: wp.float32, ends: wp.vec4, sides: wp.vec2) -> wp.vec2:
     """Return the lowest and highest x of the rectangle at ``dy`` below a, which is at ``x``; low > high where
     there is none.
     """
@@ -189,15 +192,55 @@ def half_width(width: wp.float32, scale: wp.float32) -> wp.float32:
     return wp.min(0.5 * scale * width, constants.REACH_MAX)
 
 
+@wp.kernel
+def segment_rectangles(
+    # In:
+    offset: wp.int32,
+    part: wp.array[wp.int32],  # [shape_count]
+    widths: wp.array[wp.float32],  # [shape_count] canvas units
+    scale: wp.float32,
+    vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
+    vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
+    vertex_first: wp.array[wp.int32],  # [shape_count]
+    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
+    vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    # Out:
+    segment_box: wp.array[wp.vec4],  # [vertex_capacity] px; lowest and highest x and y; none: highest below
+    segment_ends: wp.array[wp.vec4],  # [vertex_capacity] see short_sides
+    segment_sides: wp.array[wp.vec2],  # [vertex_capacity] see long_sides
+):
+    """Find the rectangles of pixels that segments may be nearest to. One thread a segment."""
+    i = offset + wp.tid()
+    if i >= vertex_ends[vertex_ends.shape[0] - 1]:
+        return
+    shape = vertex_shape[i]
+    if part[shape] != constants.STROKE:
+        return
+    if i < vertex_first[shape] or i >= vertex_last[shape] or vertex_next[i] == constants.NONE:
+        segment_box[i] = wp.vec4(FAR, -FAR, FAR, -FAR)
+        return
+    reach = half_width(widths[shape], scale) + HALF_DIAGONAL
+    a = vertex[i]
+    d = vertex[vertex_next[i]] - a
+    length = wp.length(d)
+    e = direction(d, length)
+    over = overhang(vertex, vertex_next, i, vertex_first[shape], reach)
+    segment_box[i] = box_around(a, e, length, reach, over)
+    segment_ends[i] = short_sides(e, length, over)
+    segment_sides[i] = long_sides(e, reach)
+
+
 @wp.func
 def keep_nearest(
     pixels: wp.array2d[wp.float32],
     segment: wp.array2d[wp.int32],
     slot_near: wp.array2d[wp.int32],
-    vertex: wp.array[wp.vec2],
     j: wp.int32,
+    a: wp.vec2,
     b: wp.vec2,
-    over: wp.vec2,
+    ends: wp.vec4,
+    sides: wp.vec2,
     reach: wp.float32,
     inside: wp.float32,
     slot: wp.int32,
@@ -206,22 +249,15 @@ def keep_nearest(
     rows: wp.vec2i,
     top: wp.int32,
 ):
-    """Store segment ``j``, which ends at ``b``, and reach^2 - distance^2 in the pixels to which it is nearer
+    """Store segment ``j`` from ``a`` to ``b`` and reach^2 - distance^2 in the pixels to which it is nearer
     than all segments before it.
 
-    ``columns``, ``rows``: a lane's pixels [first, last) of the row of tiles at ``top`` that starts with
-    ``slot``; those that have ``inside`` are finished.
+    ``ends``, ``sides``: see ``short_sides`` and ``long_sides``. ``columns``: a lane's pixels [first, last) of
+    the row of tiles at ``top`` that starts with ``slot``; ``rows``: those of them that the segment reaches.
+    Those that have ``inside`` are finished.
     """
-    a = vertex[j]
     d = b - a
-    length = wp.length(d)
-    e = direction(d, length)
-    inverse = 1.0 / wp.max(length * length, TINY)
-    ends = segment_ends(e, length, over)
-    sides = segment_sides(e, reach)
-    heights = segment_rows(a, e, length, reach, over)
-    ys = pixels_within(heights[0], heights[1], rows[0], rows[1])
-    for y in range(ys[0], ys[1]):
+    for y in range(rows[0], rows[1]):
         py = float(y) + 0.5 - a[1]
         span = segment_span(a[0], py, ends, sides)
         xs = pixels_within(span[0], span[1], columns[0], columns[1])
@@ -238,7 +274,7 @@ def keep_nearest(
             # Well inside the stroke it does not matter which segment is nearest.
             if so_far < inside:
                 px = float(x) + 0.5 - a[0]
-                t = wp.clamp((px * d[0] + py * d[1]) * inverse, 0.0, 1.0)
+                t = wp.clamp((px * d[0] + py * d[1]) * ends[3], 0.0, 1.0)
                 rx = px - t * d[0]
                 ry = py - t * d[1]
                 near = reach * reach - rx * rx - ry * ry
@@ -305,10 +341,11 @@ def cover_slot(
 def make_forward(column: Any) -> wp.Kernel:
     """Return the kernel that covers strokes, for vectors of type ``column``.
 
-    A thread has all rows of a row of tiles, or one row of pixels.
+    A thread has a row of tiles; or, where there are many threads, one row of pixels of one tile.
     """
     by_rows = column is not tile_column
     lane_rows = 1 if by_rows else constants.TILE
+    own_row = one_tile if by_rows else tile_row
 
     @wp.kernel(name="stroke_forward", module="unique", module_options=constants.MODULE_OPTIONS)
     def stroke_forward(
@@ -324,6 +361,9 @@ def make_forward(column: Any) -> wp.Kernel:
         vertex_last: wp.array[wp.int32],  # [shape_count]
         vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
         vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+        segment_box: wp.array[wp.vec4],  # [vertex_capacity] px, see segment_rectangles
+        segment_ends: wp.array[wp.vec4],  # [vertex_capacity]
+        segment_sides: wp.array[wp.vec2],  # [vertex_capacity]
         # Out:
         coverage: wp.array2d[column],  # [slot_capacity, columns] in [0, 1]
         coverage_pixels: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] the same memory
@@ -332,11 +372,11 @@ def make_forward(column: Any) -> wp.Kernel:
         slot_near: wp.array2d[wp.int32],  # [slot_capacity, row_lanes] whether a segment is near
     ):
         """Find the nearest segment of each pixel, then coverages. One thread a row of tiles of a shape (that
-        of its leftmost slot) and lane.
+        of its leftmost slot), or a slot and lane.
         """
         i, lane = wp.tid()
         slot = offset + i
-        row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+        row = own_row(slot, slot_shape, slot_first, shape_tiles)
         shape = row[0]
         if shape < 0:
             return
@@ -361,26 +401,24 @@ def make_forward(column: Any) -> wp.Kernel:
                 else:
                     coverage[s, x] = column(0.0)
         for j in range(vertex_first[shape], vertex_last[shape]):
-            if vertex_next[j] == constants.NONE:
-                continue
-            a = vertex[j]
-            b = vertex[vertex_next[j]]
-            if wp.min(a[1], b[1]) - reach < float(rows[1]) and wp.max(a[1], b[1]) + reach > float(rows[0]):
-                over = overhang(vertex, vertex_next, j, vertex_first[shape], reach)
+            box = segment_box[j]
+            near_rows = pixels_within(box[2], box[3], rows[0], rows[1])
+            if near_rows[0] < near_rows[1] and box[0] < float(columns[1]) and box[1] > float(columns[0]):
                 keep_nearest(
                     coverage_pixels,
                     segment,
                     slot_near,
-                    vertex,
                     j,
-                    b,
-                    over,
+                    vertex[j],
+                    vertex[vertex_next[j]],
+                    segment_ends[j],
+                    segment_sides[j],
                     reach,
                     inside,
                     slot,
                     lane,
                     columns,
-                    rows,
+                    near_rows,
                     top,
                 )
         for s in range(slot, slot + row[2]):
@@ -414,6 +452,9 @@ def stroke_backward(
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
+    segment_box: wp.array[wp.vec4],  # [vertex_capacity] px, see segment_rectangles
+    segment_ends: wp.array[wp.vec4],  # [vertex_capacity]
+    segment_sides: wp.array[wp.vec2],  # [vertex_capacity]
     segment: wp.array2d[wp.int32],  # [slot_capacity, TILE_PIXELS]
     sum_grad: wp.array2d[wp.float32],  # [slot_capacity, TILE_PIXELS] 0 where the coverage is 0 or 1
     # Out:
@@ -433,25 +474,19 @@ def stroke_backward(
     of_half = float(0.0)
     if slot_last[shape] > slot_first[shape] and vertex_next[i] != constants.NONE:
         half = half_width(widths[shape], scale)
-        reach = half + HALF_DIAGONAL
         x0 = shape_tiles[shape, 0]
         y0 = shape_tiles[shape, 1]
         wide = shape_tiles[shape, 2] - x0
         a = vertex[i]
         b = vertex[vertex_next[i]]
-        length = wp.length(b - a)
-        e = direction(b - a, length)
-        over = overhang(vertex, vertex_next, i, vertex_first[shape], reach)
-        ends = segment_ends(e, length, over)
-        sides = segment_sides(e, reach)
-        heights = segment_rows(a, e, length, reach, over)
+        box = segment_box[i]
         # The rectangle's corners may lie outside the shape's tiles, where it has no pixel.
         right = wp.min(width, constants.TILE * shape_tiles[shape, 2])
         bottom = wp.min(height, constants.TILE * shape_tiles[shape, 3])
-        ys = pixels_within(heights[0], heights[1], constants.TILE * y0, bottom)
+        ys = pixels_within(box[2], box[3], constants.TILE * y0, bottom)
         for y in range(ys[0], ys[1]):
             slot_row = slot_first[shape] + (y / constants.TILE - y0) * wide - x0
-            span = segment_span(a[0], float(y) + 0.5 - a[1], ends, sides)
+            span = segment_span(a[0], float(y) + 0.5 - a[1], segment_ends[i], segment_sides[i])
             xs = pixels_within(span[0], span[1], constants.TILE * x0, right)
             for x in range(xs[0], xs[1]):
                 slot = slot_row + x / constants.TILE

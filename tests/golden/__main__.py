@@ -17,7 +17,7 @@ EXPECTED = Path(__file__).with_name("digests.json")
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.golden", description=__doc__)
     parser.add_argument("cases", nargs="*", help="names of cases; default: all")
-    parser.add_argument("--threads", type=int, help="CPU threads; default: all cores")
+    parser.add_argument("--threads", type=int, help="CPU threads; default: the usual number")
     parser.add_argument("--device", default="cpu", help="default: cpu; others round differently")
     parser.add_argument("--gpu-lanes", action="store_true", help="divide tiles on the CPU as on a GPU")
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="write the SVGs here as well")

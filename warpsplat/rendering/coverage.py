@@ -51,6 +51,10 @@ class ExactBuffers(CoverageBuffers):
     slot_winding: wp.array = buffer(wp.int32, "fill_slots")
     """Winding number of slots that no edge touches."""
     slot_near: wp.array = buffer(wp.int32, "stroke_slots", "row_lanes")
+    segment_box: wp.array = buffer(wp.vec4, "segments")
+    """Of the rectangle of pixels that a stroke's segment may be nearest to."""
+    segment_ends: wp.array = buffer(wp.vec4, "segments")
+    segment_sides: wp.array = buffer(wp.vec2, "segments")
     segment: wp.array = buffer(wp.int32, "stroke_slots", constants.TILE_PIXELS)
     """Nearest segment of each pixel."""
 
@@ -68,9 +72,9 @@ class ExactCoverage:
         self._inputs, self._outline = inputs, outline
         self._parts = inputs.parameters.parts
         slots, lanes = inputs.slots, inputs.backend.row_lanes
-        sizes = {"slots": slots, "row_lanes": lanes, "fill_slots": slots, "stroke_slots": 0}
+        sizes = {"slots": slots, "row_lanes": lanes, "fill_slots": slots, "stroke_slots": 0, "segments": 0}
         if constants.STROKE in self._parts:
-            sizes["stroke_slots"] = slots
+            sizes |= {"stroke_slots": slots, "segments": inputs.samples}
         self.buffers: CoverageBuffers = inputs.backend.allocate(ExactBuffers, sizes)
         arrays = inputs.parameters.arrays
         self._edges: dict[int, tuple[object, ...]] = dict.fromkeys(self._parts, (outline.buffers, arrays))
@@ -95,6 +99,7 @@ class ExactCoverage:
             if part == constants.STROKE:
                 from warpsplat.kernels.coverage import stroke  # brings kernels that fills do not need
 
+                self._launch(program, part, stroke.segment_rectangles, self._inputs.samples)
                 kernel = stroke.make_forward(backend.column)
                 self._launch(program, part, kernel, (slots, backend.row_lanes))
             else:

@@ -7,7 +7,7 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -147,12 +147,15 @@ class Engine:
             gradient.copy_(self._grads[name].reshape(gradient.shape))
 
     def _replay(self, program: Program) -> None:
-        """Run a program: as a graph, without Python, on one CPU thread; a GPU does not wait for Python."""
-        replay: Callable[[], None] = self._graphs.get(program, program.run)
-        if program.device.is_cpu and program not in self._graphs:
-            replay = made = Replay(program.device, [program])
-            if made.graph:
-                self._graphs[program] = made
+        """Run a program: as a graph, without Python, where there can be one; in a CUDA graph of torch,
+        launches become part of that.
+        """
+        if self.is_captured:
+            program.run()
+            return
+        replay = self._graphs.get(program) or Replay(program.device, [program])
+        if replay.graph or program.device.is_cuda:  # what a GPU refuses, it always does
+            self._graphs[program] = replay
         replay()
 
     @staticmethod

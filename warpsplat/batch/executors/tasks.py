@@ -31,7 +31,7 @@ class Task:
     settings: Settings
     device: str = "auto"
     threads: int | None = None
-    """Threads on a CPU; None: all cores."""
+    """Threads on a CPU; None: the usual number."""
     mask: bytes | None = field(default=None, repr=False)
     """Importance mask."""
     mask_name: str = ""
