@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +14,6 @@ from warpsplat.portable.elementary import arctan2, exp, hypot
 from warpsplat.portable.sequences import convolve, interp
 
 END = 2.0  # [rad²] what an end of a stroke costs, as the bending of a line that goes on instead
-MOST_ARMS = 10  # of a junction whose lines are joined by the least bending of all; of larger ones one by one
 
 End = tuple[int, int]
 """An edge's number, and 0 where it begins or 1 where it ends."""
@@ -38,15 +35,25 @@ class Arm(NamedTuple):
 Pairs = list[tuple[int, int]]
 
 
-def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
-    """Return edges of one pen that go straight on into one another, in order and direction, and their pen.
+class Chain(NamedTuple):
+    """Edges of one pen that go straight on into one another."""
+
+    edges: list[Edge]
+    """In order and direction."""
+    closed: bool
+    """Whether the last one goes on as the first."""
+    pen: int
+
+
+def find_chains(graph: Graph, pens: Ints) -> list[Chain]:
+    """Return the lines that are drawn without lifting the pen.
 
     Args:
         graph: A skeleton.
         pens: Of its edges.
     """
     following = _continued(graph, pens)
-    chains: list[tuple[list[Edge], int]] = []
+    chains: list[Chain] = []
     seen = [False] * len(graph.edges)
     starts = [(n, end) for n in range(len(graph.edges)) for end in (0, 1) if (n, end) not in following]
     rest = [(n, 0) for n in range(len(graph.edges))]
@@ -59,7 +66,7 @@ def find_chains(graph: Graph, pens: Ints) -> list[tuple[list[Edge], int]]:
             edges.append(graph.edges[number].backwards() if end else graph.edges[number])
             here = following.get((number, 1 - end))
         if edges:
-            chains.append((edges, int(pens[first[0]])))
+            chains.append(Chain(edges, here == first, int(pens[first[0]])))
     return chains
 
 
@@ -68,10 +75,9 @@ def _continued(graph: Graph, pens: Ints) -> dict[End, End]:
     found: dict[End, End] = {}
     for node in range(len(graph.at)):
         ends = ends_at(graph, node)
-        if len(ends) < 2 or (len(ends) == 2 and ends[0][0] == ends[1][0]):
-            continue
         arms = [arm_of(graph.edges[n], e, float(graph.radii[node])) for n, e in ends]
-        for i, j in joined_arms(arms, [int(pens[n]) for n, _ in ends])[0]:
+        pairs = [(0, 1)] if len(ends) == 2 else joined_arms(arms, [int(pens[n]) for n, _ in ends])[0]
+        for i, j in pairs:
             found[ends[i]], found[ends[j]] = ends[j], ends[i]
     return found
 
@@ -121,38 +127,20 @@ def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
         for i, j in itertools.combinations(range(len(arms)), 2)
         if kinds[i] == kinds[j]
     }
-
-    @cache
-    def best(left: tuple[int, ...]) -> tuple[float, Pairs]:
-        if not left:
-            return 0.0, []
-        first, rest = left[0], left[1:]
-        cost, pairs = best(rest)
-        found = (cost + END, pairs)
-        for j in rest:
-            if costs.get((first, j), math.inf) < 2 * END:
-                cost, pairs = best(tuple(k for k in rest if k != j))
-                found = min(found, (cost + costs[first, j], [(first, j), *pairs]))
-        return found
-
-    left = tuple(range(len(arms)))
-    early: Pairs = []
-    while len(left) > MOST_ARMS:
-        cost, pair = min((costs.get(pair, math.inf), pair) for pair in itertools.combinations(left, 2))
-        if cost >= 2 * END:
-            return early, END * len(left)
-        early.append(pair)
-        left = tuple(k for k in left if k not in pair)
-    cost, pairs = best(left)
-    return early + pairs, cost + sum(costs[pair] for pair in early)
+    left, pairs, total = set(range(len(arms))), [], 0.0
+    for pair in sorted(costs, key=lambda pair: (costs[pair], pair)):
+        if costs[pair] < 2 * END and left.issuperset(pair):
+            left.difference_update(pair)
+            pairs.append(pair)
+            total += costs[pair]
+    return pairs, total + END * len(left)
 
 
-def traced(graph: Graph, edges: list[Edge]) -> tuple[Floats, bool] | None:
-    """Return points along a chain of edges, and whether it is a ring; None if there is too little of it."""
-    parts = [_unbent(graph, edge) for edge in edges]
-    points = np.concatenate(parts)
-    first = edges[0].nodes[0]
-    closed = first == edges[-1].nodes[1] and len(parts[0]) > 0 and _is_smooth_ring(graph, edges)
+def traced(graph: Graph, chain: Chain) -> tuple[Floats, bool] | None:
+    """Return points along a chain, and whether it is a ring; None if there is too little of it."""
+    edges, closed = chain.edges, chain.closed
+    points = np.concatenate([_unbent(graph, edge) for edge in edges])
+    closed = closed and len(points) > 0
     if not closed:
         start, end = edges[0].points[0], edges[-1].points[-1]
         if len(points) > 3:
@@ -170,15 +158,6 @@ def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
     if abs(float(away[0] * direction[1] - away[1] * direction[0])) > max(radius, 1.5):
         return place
     return np.asarray(points[0] + max(float((away * direction).sum()), 0.0) * direction)
-
-
-def _is_smooth_ring(graph: Graph, edges: list[Edge]) -> bool:
-    """Return whether a chain that ends where it began goes straight on there."""
-    node = edges[0].nodes[0]
-    if len(graph.at[node]) <= 2:
-        return True
-    radius = float(graph.radii[node])
-    return bending(arm_of(edges[0], 0, radius), arm_of(edges[-1], 1, radius)) < 2 * END
 
 
 def _unbent(graph: Graph, edge: Edge) -> Floats:

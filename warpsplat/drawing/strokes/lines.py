@@ -108,10 +108,10 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
     edge_pens, ring_pens, area_pens, dot_pens = np.split(owners, bounds)
     away = None if parts.apart is None else distance_from(parts.apart)
     lines: list[CenterLine] = []
-    for edges, pen in find_chains(graph, edge_pens):
-        line = traced(graph, edges)
+    for found in find_chains(graph, edge_pens):
+        line = traced(graph, found)
         if line is not None:
-            lines.append(CenterLine(line[0] / fine, line[1], pen))
+            lines.append(CenterLine(line[0] / fine, line[1], found.pen))
     lines = _measured(lines, parts.thin.cover, thinnest=1.0 if ink.textured else THINNEST)
     if away is not None:
         lines = [joined for line in lines for joined in _joined_to(away, line)]
