@@ -12,11 +12,11 @@ import numpy as np
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.shapes import merge_near
-from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
+from warpsplat.drawing.strokes.broad import BROAD, OFF, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
-from warpsplat.drawing.strokes.lines import TracedLines, trace_ink
+from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
 from warpsplat.drawing.strokes.tour import toured
-from warpsplat.drawing.thin import THINNEST_SIDE, continued, cut, margins
+from warpsplat.drawing.thin import THIN_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated
 from warpsplat.drawing.trace.trace import trace
@@ -28,26 +28,17 @@ from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.svg.data import cubic_rows
 from warpsplat.svg.sizes import PATH
 
 STROKE_STEPS = 240
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
 
-STROKE_POINT_RATE = 0.12
-"""Learning rate of points [px]."""
-
-STROKE_WIDTH_RATE = 0.06
-"""Learning rate of widths [px]."""
-
-FILLED_END, FIT_END = 0.4, 0.9
-"""Shares of the progress at which filled areas, and the refinement of strokes, are done."""
+STROKE_RATE = 0.12
+"""Learning rate of points, and of widths on both sides of a line [px]."""
 
 THIN_STROKE = 1.0
 """Strokes thinner than this [px] keep their width: it is the minimum of a fit."""
-
-STROKE_PIXELS = 1_000_000
-"""Largest image size of the refinement [pixels]."""
-
 
 ALIKE = 0.3
 """Difference of the widths of usual strokes up to which one pen drew them [px]."""
@@ -62,7 +53,7 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     Raises:
         ImageError: there is no ink.
     """
-    across, down = margins(problem.target, THINNEST_SIDE)
+    across, down = margins(problem.target, THIN_SIDE)
     problem = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     ink = find_ink(problem.target, mixed=settings.mixed)
@@ -72,18 +63,15 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     traced = trace_ink(ink, mixed=settings.mixed)
     if not traced.lines and not traced.areas:
         raise ImageError("no lines found: nothing but specks is darker than the paper around it")
-    begin = FILLED_END if traced.areas else 0.0
+    begin = 0.5 if traced.areas else 0.0
     lines, fills = traced.scene(), traced.scene().take(np.zeros(0, np.intp))
     made, per_pixel = Fit(lines, 1.0, 0.0, 0.0, 0, False), 1.0
     if traced.areas:
         fills, per_pixel = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
     if len(lines):
-        start, picture, importance = _to_refine(ink, traced, lines)
-        fitted = line_settings(settings, len(start))
-        made = fit(Problem(picture, fitted, importance), run.part(begin, FIT_END), Start(scene=start))
-        widths = np.where(lines.widths < THIN_STROKE, lines.widths, made.scene.widths)
-        lines = with_equal_widths(replace(lines, points=made.scene.points, widths=widths))
-        lines = toured(with_dots(ink, traced, lines, run))
+        picture, importance = _to_refine(ink, traced)
+        made = refined(lines, Problem(picture, settings, importance), run.part(begin, 1.0))
+        lines = toured(with_dots(ink, traced, made.scene, run))
     scene = fills.append(lines)
     scene = scene.take(np.argsort(scene.layer, kind="stable"))
     scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
@@ -121,9 +109,7 @@ def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
     pens = np.linalg.norm(traced.pens - colors[:, None], axis=2).argmin(axis=1)
     points = np.repeat(found[:, None, :2], 4, axis=1)
     added = Scene.uniform(Kind.STROKE, lines.canvas, points, colors=traced.pens[pens], widths=found[:, 2])
-    added = replace(added, opacities=np.ones(len(dots), np.float32), layer=pens.astype(np.int32))
-    both = lines.append(added)
-    return both.take(np.argsort(both.layer, kind="stable"))
+    return lines.append(replace(added, opacities=np.ones(len(dots), np.float32), layer=pens.astype(np.int32)))
 
 
 def _best_disc(bare: Bools, inside: Floats) -> tuple[float, float, float]:
@@ -142,14 +128,12 @@ def _best_disc(bare: Bools, inside: Floats) -> tuple[float, float, float]:
     return column + 0.5, row + 0.5, float(best[row, column])
 
 
-def _to_refine(ink: Ink, traced: TracedLines, lines: Scene) -> tuple[Scene, FloatArray, FloatArray | None]:
-    """Return strokes on the paper, the picture they are refined against, and its importance mask.
+def _to_refine(ink: Ink, traced: TracedLines) -> tuple[FloatArray, FloatArray | None]:
+    """Return the picture that strokes are refined against, and its importance mask.
 
     In the picture even ink of the pen whose mixture is nearest is on even paper.
     """
-    paper = np.ones(3, np.float32) if ink.paper is None else ink.paper
-    canvas = replace(lines.canvas, background=paper)
-    start = replace(lines, layer=np.zeros_like(lines.layer), canvas=canvas)
+    paper = _opaque(ink.paper)
     cover, importance = ink.cover[..., None], None
     if traced.areas:  # strokes reach into them
         importance = 1 - traced.areas.cover
@@ -157,7 +141,27 @@ def _to_refine(ink: Ink, traced: TracedLines, lines: Scene) -> tuple[Scene, Floa
     mixtures = [paper + cover * (pen - paper) for pen in traced.pens]
     away = [np.square(ink.shown - mixture).sum(axis=2) for mixture in mixtures]
     picture = np.take_along_axis(np.stack(mixtures), np.argmin(away, axis=0)[None, ..., None], axis=0)[0]
-    return start, picture.astype(np.float32), importance
+    return picture.astype(np.float32), importance
+
+
+def _opaque(paper: FloatArray | None) -> FloatArray:
+    """Return the colour of a paper; white if it is transparent."""
+    return np.ones(3, np.float32) if paper is None else paper
+
+
+def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
+    """Return traced strokes fitted to a picture of their ink.
+
+    Those that are about as wide have one width, and lines that are nearly straight and level are so.
+    """
+    paper = _opaque(strokes.canvas.background)
+    canvas = replace(strokes.canvas, background=paper)
+    start = replace(strokes, layer=np.zeros_like(strokes.layer), canvas=canvas)
+    settings = _line_settings(problem.settings, len(start))
+    made = fit(replace(problem, settings=settings), run, Start(scene=start))
+    widths = np.where(strokes.widths < THIN_STROKE, strokes.widths, made.scene.widths)
+    found = replace(made.scene, widths=widths, canvas=strokes.canvas, layer=strokes.layer)
+    return replace(made, scene=_straight(with_equal_widths(found)))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:
@@ -170,6 +174,26 @@ def with_equal_widths(strokes: Scene) -> Scene:
     return replace(strokes, widths=widths.astype(np.float32))
 
 
+def _straight(strokes: Scene) -> Scene:
+    """Return strokes with straight and level lines where they nearly are."""
+    points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
+    first, last = rows[are_straight(points, rows)][:, [0, 3]].T
+    for axis in (0, 1):
+        near = np.abs(points[first, axis] - points[last, axis]) < OFF
+        mean = (points[first[near], axis] + points[last[near], axis]) / 2
+        points[first[near], axis] = points[last[near], axis] = mean
+    a, b = points[first], points[last]
+    points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
+    return replace(strokes, points=points.astype(np.float32))
+
+
+def are_straight(points: Floats, rows: IndexArray) -> Bools:
+    """Return which cubics, ``rows`` of points, lines are near."""
+    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
+    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
+    return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
+
+
 def lengths_of(strokes: Scene) -> Floats:
     """Return the lengths of the control polygons of strokes [px], shape (stroke,)."""
     steps = np.append(hypot(*np.diff(strokes.points.astype(np.float64), axis=0).T), 0.0)
@@ -177,7 +201,7 @@ def lengths_of(strokes: Scene) -> Floats:
     return np.asarray(np.add.reduceat(steps, strokes.first[:-1]))
 
 
-def line_settings(settings: Settings, count: int) -> Settings:
+def _line_settings(settings: Settings, count: int) -> Settings:
     """Return the settings of the refinement of ``count`` strokes: of their places and widths alone."""
     fixed = dict.fromkeys(settings.rates, 0.0)
     return replace(
@@ -185,9 +209,9 @@ def line_settings(settings: Settings, count: int) -> Settings:
         curves=min(count, 100_000),
         iterations=min(settings.iterations, STROKE_STEPS),
         coarse=0.0,
-        fine_pixels=min(settings.fine_pixels, STROKE_PIXELS),
+        fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
         density=Density(interval=0),
-        rates={**fixed, "points": STROKE_POINT_RATE, "widths": STROKE_WIDTH_RATE},
+        rates={**fixed, "points": STROKE_RATE, "widths": STROKE_RATE / 2},
         mixed=False,
         renderer="exact",
         texture=0.0,

@@ -8,31 +8,24 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.line_art import STROKE_STEPS, lengths_of, line_settings, with_equal_widths
+from warpsplat.drawing.line_art import STROKE_STEPS, are_straight, lengths_of, refined
+from warpsplat.drawing.picture import MARGIN
 from warpsplat.drawing.prices import CUBIC, LINE, MOVE
-from warpsplat.drawing.strokes.broad import OFF
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.drawing.trace.grids import at_pixels
-from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, IndexArray, Kind, Paint, Scene
+from warpsplat.scene import IndexArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.data import cubic_rows
 from warpsplat.svg.sizes import PATH
 
-MARGIN = 3
-"""Clear pixels around a shape."""
-
 SPOT, SPOT_SIDE = 1.5, 5
 """Area that differs in a square of some side [px], at most [px²]: at wide blunt ends more does."""
-
-LONG = 1.5
-"""Least length of what is no dot, over its width."""
 
 SLENDER = 17.0
 """Square of the outline's length over the area of what may be strokes, at the least: a square has 16."""
@@ -75,12 +68,9 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene()
     if not len(traced):
         return shape
-    traced = replace(
-        traced, canvas=canvas, layer=np.zeros_like(traced.layer), colors=np.zeros_like(traced.colors)
-    )
+    traced = replace(traced, canvas=canvas, colors=np.zeros_like(traced.colors))
     quiet = replace(run, on_progress=None, checkpoint=None)
-    problem = Problem(shown, replace(line_settings(settings, len(traced)), iterations=STROKE_STEPS))
-    strokes = _clean(fit(problem, quiet, Start(scene=traced)).scene)
+    strokes = refined(traced, Problem(shown, replace(settings, iterations=STROKE_STEPS)), quiet).scene
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     # What a part covers of the pixels beside its mask belongs to it.
     grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
@@ -93,8 +83,10 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
         np.bincount(owner, sizes, count)
         for owner, sizes in ((part, PATH + _sizes(strokes)), (outline_part, _sizes(alone)))
     )
-    off = render(strokes, backend=run.backend)[..., 0] - shown[..., 0]
-    gone = _are_near(parts, off, length) & (length * length > LONG * area) & (then <= before)
+    off = np.abs(render(strokes, backend=run.backend)[..., 0] - shown[..., 0])
+    worst = np.zeros(count, np.float32)
+    np.maximum.at(worst, parts.ravel(), filters.box_sum(off, SPOT_SIDE).ravel())
+    gone = (worst <= SPOT) & (length * length > area) & (then <= before)  # dots stay
     gone[0] = False
     chosen = np.flatnonzero(gone[part])
     if not len(chosen):
@@ -111,31 +103,10 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     return _having(shape, ~gone[outline_part]).append(strokes)
 
 
-def _clean(strokes: Scene) -> Scene:
-    """Return fitted strokes with equal widths, and with straight and level lines where they nearly are."""
-    strokes = with_equal_widths(strokes)
-    points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
-    first, last = rows[_is_straight(points, rows)][:, [0, 3]].T
-    for axis in (0, 1):
-        near = np.abs(points[first, axis] - points[last, axis]) < OFF
-        mean = (points[first[near], axis] + points[last[near], axis]) / 2
-        points[first[near], axis] = points[last[near], axis] = mean
-    a, b = points[first], points[last]
-    points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
-    return replace(strokes, points=points.astype(np.float32))
-
-
-def _is_straight(points: Floats, rows: IndexArray) -> Flags:
-    """Return which cubics lines are near."""
-    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
-    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
-    return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
-
-
 def _sizes(scene: Scene) -> Floats:
     """Return the bytes of the data of each contour, shape (contour,)."""
     rows = cubic_rows(scene)
-    pieces = np.where(_is_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
+    pieces = np.where(are_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
     owner = np.searchsorted(scene.starts, rows[:, 0], side="right") - 1
     return np.asarray(MOVE + np.bincount(owner, pieces, len(scene.starts) - 1), np.float64)
 
@@ -148,20 +119,6 @@ def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:
     votes = votes.reshape(contours, count)
     votes[:, 0] = 0
     return votes.argmax(axis=1)
-
-
-def _are_near(parts: IndexArray, off: FloatArray, length: Floats) -> Flags:
-    """Return which parts of a shape strokes cover alike, shape (part,).
-
-    Args:
-        parts: The part of each pixel.
-        off: What strokes cover of each pixel less than the shape.
-        length: Of the strokes of each part [px].
-    """
-    worst = np.zeros(len(length))
-    np.maximum.at(worst, parts.ravel(), np.abs(filters.box_sum(off, SPOT_SIDE)).ravel().astype(np.float64))
-    away = np.bincount(parts.ravel(), np.abs(off).ravel(), len(length))
-    return np.asarray((worst <= SPOT) & (away <= 2 * OFF * length), np.bool_)
 
 
 def _having(shape: Scene, chosen: Flags) -> Scene:

@@ -13,9 +13,6 @@ from warpsplat.scene import FloatArray, Scene
 THIN_SIDE = 16
 """Most rows or columns of an image in which tracing may miss regions: edges take a pixel on each side."""
 
-THINNEST_SIDE = 4
-"""Most rows or columns of an image in which tracing may miss lines too."""
-
 BEYOND = 4
 """How far a thin image is continued [px]: regions and lines are distinguished within less."""
 

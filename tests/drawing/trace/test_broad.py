@@ -72,7 +72,7 @@ def test_pens_have_the_colour_of_their_areas() -> None:
 def test_ends_far_from_areas_stay() -> None:
     """A line reaches beyond its own width into the area at one of its ends."""
     image = drawn('<path d="M4 16H36V56H4Z" fill="#000" stroke="none"/><path d="M30 36H80"/>')
-    (line,) = trace_ink(find_ink(image), mixed=True).lines
+    (line,) = trace_ink(find_ink(image, mixed=True), mixed=True).lines
     near, far = sorted(line.points[[0, -1], 0].tolist())
     assert 30 < near < 35
     assert far == pytest.approx(80, abs=1.2)

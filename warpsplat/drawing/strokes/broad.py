@@ -9,7 +9,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from warpsplat.drawing.strokes.ink import Ink
+from warpsplat.drawing.strokes.ink import WIDEST, Ink
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, bounding_boxes, depth, dilated, eroded
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
@@ -18,7 +18,6 @@ from warpsplat.scene import FloatArray
 USUAL = 0.75  # quantile of the width along all lines that counts as theirs: much of the rest is texture
 BROAD = 2.0  # half the width from which on ink is no line, over the usual width
 THINNEST = 1.2  # usual width of lines, at the least [px]: masks have no half pixels
-LINE = 1 / 20  # width of the broadest line beside areas, over the longer side of the image
 OVERLAP = 0.15  # of neighbouring rings, over their width
 OFF = 0.2
 """Most by which an outline is off in the mean where strokes draw it [px]."""
@@ -80,7 +79,7 @@ def split(ink: Ink, *, mixed: bool) -> Split:
     """Tell lines from what is much broader: areas if ``mixed``, else dots and what rings fill."""
     width = pen_width(ink.mask)
     if mixed:
-        width = min(width, max(THINNEST, LINE * max(ink.mask.shape)))
+        width = min(width, max(THINNEST, WIDEST * max(ink.mask.shape)))
     away = depth(ink.mask) - 0.5
     if (away <= BROAD * width).all():
         return Split(ink, width)
@@ -135,7 +134,8 @@ def _with_dots_and_rings(ink: Ink, labels: Ints, away: Floats, width: float) -> 
             (inner & (away > level)).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
         )
         rings += [ring.reshape(-1, 2) + 0.5 for ring in found if len(ring) > 4]
-    thin = ink.without(dilated(round_, 3) & (labels == 0) & ~ink.mask | round_ | inner)
+    covered = dilated(round_, 3) & (labels == 0) & ~ink.mask | round_ | inner
+    thin = replace(ink, mask=ink.mask & ~covered, cover=np.where(covered, 0, ink.cover).astype(np.float32))
     return Split(thin, width, rings, dots, apart=round_ if dots else None)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -28,22 +28,13 @@ class Ink:
     textured: bool = False
     """Whether crayons leave what cannot be told from thin lines and dots."""
 
-    def without(self, covered: Bools) -> Ink:
-        """Return the ink without what is ``covered``, shape (height, width)."""
-        cover = np.where(covered, 0, self.cover).astype(np.float32)
-        return replace(self, mask=self.mask & ~covered, cover=cover)
-
 
 SEED = 0.35  # contrast that a line must reach somewhere, over that of strong ink
 FULL = 0.9  # least contrast of full ink, over that of strong ink
-SPECK = (
-    4.0  # area of the smallest piece of faint ink, over the square of a line's width; of holes one over it
-)
 
 FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 """Least contrast of ink with the paper around it, in [0, 1], and in standard deviations of the noise."""
 
-DARK = 0.6  # contrast of a small dot that is no dirt, over that of strong ink
 WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
 
 
@@ -52,7 +43,7 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
-        mixed: Whether broad ink may be alone and have any colour.
+        mixed: Whether what is coloured in is ink too.
     """
     shown, is_clear = _on_paper(image)
     paper = _median_color(shown).astype(np.float32)
@@ -64,19 +55,18 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     floor = max(FAINTEST, FAINTEST_NOISE * noise)
     dark = contrast[contrast > floor]
     strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
-    contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed, alone=mixed)
+    contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed)
     seed = max(floor, SEED * strong)
     strongest = cv2.dilate(contrast, np.ones((WINDOW, WINDOW), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(strongest, seed), floor)
     seeds = contrast > seed
-    if not is_textured:
+    if is_textured:
+        mask = _without_specks(mask, seeds, 0.9)
+    else:
         mass = across(contrast / np.float32(strong))
         faint = max(FAINT, FAINTEST_NOISE * noise / strong)
-        mask = with_thin(mask, middles(mass, faint))
-        seeds |= mass > 2 * faint
-    sure = contrast > (np.inf if is_textured else DARK * strong)
-    mask = _without_specks(mask, seeds, sure, is_textured=is_textured)
-    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((LEAST_BROAD, LEAST_BROAD), np.uint8))
+        mask = _without_specks(with_thin(mask, middles(mass, faint)), seeds | (mass > 2 * faint))
+    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((LEAST_WIDEST, LEAST_WIDEST), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
     full = np.maximum(filters.box_blur(full, WINDOW), FULL * strong)
     cover = np.where(dilated(mask, 5) & (contrast > 0.5 * floor), np.clip(contrast / full, 0, 1), 0)
@@ -113,9 +103,9 @@ def _reduced(light: FloatArray) -> FloatArray:
     return filters.resize_area(light, (max(1, width // factor), max(1, height // factor)))
 
 
-BROAD, LEAST_BROAD = 0.05, 25
-"""Width from which on what is dark is paper of another colour, over the longer side of the image; and at the
-least [px]."""
+WIDEST, LEAST_WIDEST = 0.05, 25
+"""Width of the broadest line, over the longer side of the image, and at the least [px]: what is broader is
+paper of another colour, or an area."""
 
 
 def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArray:
@@ -128,27 +118,27 @@ def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArr
             texture that shows in some channels; its outlines show in all.
     """
     height, width = light.shape[:2]
-    broad = max(LEAST_BROAD, BROAD * max(height, width)) * small.shape[1] / width
+    broad = max(LEAST_WIDEST, WIDEST * max(height, width)) * small.shape[1] / width
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(broad / 2) + 1,) * 2)
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, kernel, borderType=cv2.BORDER_REPLICATE)
     # The edge of what is coloured broadly is no line, although the reduced image blurs it.
     paper = cv2.erode(paper, np.ones((3, 3), np.uint8))
     contrast = np.clip(filters.resize_linear(paper, (width, height)) - light, 0, 1)
+    return _most(contrast, in_all=in_all)
+
+
+def _most(contrast: FloatArray, *, in_all: bool) -> FloatArray:
+    """Return the contrast in the channel that shows it most; or least, to be in all of them."""
     return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
 
 
-def _with_solid(
-    contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool, alone: bool
-) -> FloatArray:
-    """Return the contrast with the paper of the whole image where that is as strong as in lines.
+def _with_solid(contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool) -> FloatArray:
+    """Return the contrast with the paper of the whole image where that is as strong as in lines, or anywhere.
 
-    What is broad and as dark as ink is no paper. ``alone``: or as strong as anywhere, if there are no lines.
+    What is broad and as dark as ink is no paper.
     """
-    away = np.clip(_median_color(light) - light, 0, 1)
-    whole = away.min(axis=2) if in_all else away.max(axis=2)
+    whole = _most(np.clip(_median_color(light) - light, 0, 1), in_all=in_all)
     lines = contrast > 0.5 * strong
-    if not lines.any() and not alone:
-        return contrast
     solid = whole > FULL * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
     # With its edge, whose pixels are mixed.
     return np.asarray(np.where(dilated(solid, 3), np.maximum(contrast, whole), contrast), np.float32)
@@ -173,25 +163,19 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-SMALLEST = 2  # [px] of a piece of dark ink, and of a hole
+def _without_specks(mask: Bools, seeds: Bools, least: float = 0.0) -> Bools:
+    """Return the parts of ``mask`` of more than a pixel with seeds, without pinholes.
 
-
-def _without_specks(mask: Bools, seeds: Bools, dark: Bools, *, is_textured: bool) -> Bools:
-    """Return the parts of ``mask`` with seeds that are no specks, or ``dark``, without pinholes.
-
-    If paper ``is_textured`` most of a part must be seeds.
+    ``least``: share of seeds that a part must have more of.
     """
-    edge = mask & ~eroded(mask, 3)
-    width = 2 * float(mask.sum()) / max(1, int(edge.sum()))
+    half_width = float(mask.sum()) / max(1, int((mask & ~eroded(mask, 3)).sum()))
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     sizes = stats[:, cv2.CC_STAT_AREA]
-    held = sizes >= SPECK * width * width
-    held |= (np.bincount(parts[dark], minlength=len(sizes)) > 0) & (sizes >= SMALLEST)
-    held &= np.bincount(parts[seeds], minlength=len(sizes)) > 0.5 * is_textured * sizes
+    held = (sizes > 1) & (np.bincount(parts[seeds], minlength=len(sizes)) > least * sizes)
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
-    pinholes = stats[:, cv2.CC_STAT_AREA] < max(SMALLEST, width * width / SPECK)
+    pinholes = stats[:, cv2.CC_STAT_AREA] < max(2, half_width * half_width)
     pinholes[0] = False
     return np.asarray(inked | pinholes[parts], np.bool_)
 
@@ -201,7 +185,6 @@ SPREAD = 0.8  # [px] standard deviation of the filter by which ink across lines 
 FAINT = 0.12
 """Ink across a line from which on it goes on; it must have twice as much somewhere [px of full ink]."""
 
-MIDDLE = 0.5  # share that the middle of a line has of the largest amount beside it
 LONG = 5  # [px] of a thin line that goes on from one place only, at the least
 
 
@@ -234,7 +217,7 @@ def across(ink: FloatArray, fine: int = 1) -> FloatArray:
 def middles(mass: FloatArray, least: float, fine: int = 1) -> Bools:
     """Return the pixels in the middle of lines with at least so much ink across; arguments as ``across``."""
     most = cv2.dilate(mass, np.ones((2 * fine + 1, 2 * fine + 1), np.uint8))
-    return np.asarray((mass > least) & (mass > MIDDLE * most), np.bool_)
+    return np.asarray((mass > least) & (2 * mass > most), np.bool_)
 
 
 def with_thin(mask: Bools, thin: Bools, fine: int = 1) -> Bools:

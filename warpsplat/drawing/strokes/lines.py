@@ -22,10 +22,9 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
-DOUBT = np.ones((1, 1), np.float32)  # how far off centre lines are at corners, anywhere [px]
 TOLERANCE = 0.4  # [px] largest distance of a centre line from its curve
-THINNEST = 0.3  # [px] width of a stroke, at the least; of crayons one pixel
-FINE = 1100  # [px] longer side of an image up to which its ink is thinned at twice the size
+THINNEST = 0.3  # [px] width of a stroke, at the least
+FINE_PIXELS = 1_000_000  # of the largest image whose ink is thinned at twice the size
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,8 @@ class TracedLines:
     def scene(self) -> Scene:
         """Return the lines as opaque strokes; ``layer`` is the pen of each."""
         runs = [line.polyline() for line in self.lines]
-        fitted = fit_polylines(runs, [TOLERANCE] * len(runs), DOUBT)
+        unsure = np.ones((1, 1), np.float32)  # how far off centre lines are at corners, anywhere [px]
+        fitted = fit_polylines(runs, [TOLERANCE] * len(runs), unsure)
         # Closed chains do not repeat their first point.
         chains = [
             np.concatenate([pieces.cubics[:, :3].reshape(-1, 2), pieces.cubics[-1:, 3][line.closed :]])
@@ -94,7 +94,7 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
         only_lines: Whether it has no broad parts, however wide it is.
     """
     parts = Split(ink) if only_lines else split(ink, mixed=mixed)
-    fine = 2 if max(ink.mask.shape) <= FINE else 1
+    fine = 2 if ink.mask.size <= FINE_PIXELS else 1
     graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
     graph = with_crossings(graph)
     places: list[list[Floats]] = [
@@ -112,7 +112,7 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
         line = traced(graph, found)
         if line is not None:
             lines.append(CenterLine(line[0] / fine, line[1], found.pen))
-    lines = _measured(lines, parts.thin.cover, thinnest=1.0 if ink.textured else THINNEST)
+    lines = _measured(lines, parts.thin.cover, THINNEST)
     if away is not None:
         lines = [joined for line in lines for joined in _joined_to(away, line)]
     for ring, pen in zip(parts.rings, ring_pens.tolist(), strict=True):

@@ -11,7 +11,6 @@ from warpsplat.scene import FloatArray
 
 ALIKE = 30.0  # distance in CIELAB, lightness counted by half, up to which two inks are one pen
 SELDOM = 0.015  # share of the length of all lines that a pen has, at the least
-MOST = 8  # pens
 
 
 def line_colors(lines: list[Floats], ink: Ink) -> tuple[FloatArray, Floats]:
@@ -60,12 +59,12 @@ def _nearest(places: Floats, centers: Floats) -> Ints:
 
 
 def _unlike(places: Floats, weights: Floats) -> list[int]:
-    """Return up to MOST of the places with the largest weights that are unlike those before."""
+    """Return the places that are unlike those of larger weights."""
     held: list[int] = []
     for i in np.argsort(-weights, kind="stable").tolist():
         if not held or np.linalg.norm(places[held] - places[i], axis=1).min() > ALIKE:
             held.append(i)
-    return held[:MOST]
+    return held
 
 
 def _weighted_median(values: FloatArray, weights: Floats) -> Floats:

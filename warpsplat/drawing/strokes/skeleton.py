@@ -189,17 +189,13 @@ def contracted(graph: Graph, overlaps: list[int]) -> Graph:
     for number in sorted(set(range(len(graph.edges))) - set(overlaps)):
         edge = graph.edges[number]
         a, b = (int(names[node]) for node in edge.nodes)
-        if a == b and edge.nodes[0] != edge.nodes[1] and _within(edge.points, places[a], radii[a]):
-            continue
         points = edge.points
         if edge.nodes[0] != edge.nodes[1]:
+            if a == b and (hypot(*(points - places[a]).T) <= radii[a]).all():
+                continue
             points = np.concatenate([places[a : a + 1], points[1:-1], places[b : b + 1]])
         edges.append(replace(edge, points=points, nodes=(a, b)))
     return with_joined_edges(Graph(edges, places, radii))
-
-
-def _within(points: Floats, place: Floats, radius: float) -> bool:
-    return bool((hypot(*(points - place).T) <= radius).all())
 
 
 def with_joined_edges(graph: Graph) -> Graph:
