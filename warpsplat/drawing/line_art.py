@@ -12,7 +12,7 @@ import numpy as np
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.shapes import merge_near
-from warpsplat.drawing.strokes.broad import BROAD, OFF, disc_cover, pen_width
+from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
 from warpsplat.drawing.strokes.tour import toured
@@ -28,7 +28,6 @@ from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
-from warpsplat.svg.data import cubic_rows
 from warpsplat.svg.sizes import PATH
 
 STROKE_STEPS = 240
@@ -150,10 +149,7 @@ def _opaque(paper: FloatArray | None) -> FloatArray:
 
 
 def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
-    """Return traced strokes fitted to a picture of their ink.
-
-    Those that are about as wide have one width, and lines that are nearly straight and level are so.
-    """
+    """Return traced strokes fitted to a picture of their ink; those that are about as wide have one width."""
     paper = _opaque(strokes.canvas.background)
     canvas = replace(strokes.canvas, background=paper)
     start = replace(strokes, layer=np.zeros_like(strokes.layer), canvas=canvas)
@@ -161,7 +157,7 @@ def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
     made = fit(replace(problem, settings=settings), run, Start(scene=start))
     widths = np.where(strokes.widths < THIN_STROKE, strokes.widths, made.scene.widths)
     found = replace(made.scene, widths=widths, canvas=strokes.canvas, layer=strokes.layer)
-    return replace(made, scene=_straight(with_equal_widths(found)))
+    return replace(made, scene=with_equal_widths(found))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:
@@ -172,26 +168,6 @@ def with_equal_widths(strokes: Scene) -> Scene:
     lengths = lengths_of(strokes) + widths
     widths, _ = merge_near(widths, lengths / lengths.mean(), ALIKE * ALIKE / 2)
     return replace(strokes, widths=widths.astype(np.float32))
-
-
-def _straight(strokes: Scene) -> Scene:
-    """Return strokes with straight and level lines where they nearly are."""
-    points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
-    first, last = rows[are_straight(points, rows)][:, [0, 3]].T
-    for axis in (0, 1):
-        near = np.abs(points[first, axis] - points[last, axis]) < OFF
-        mean = (points[first[near], axis] + points[last[near], axis]) / 2
-        points[first[near], axis] = points[last[near], axis] = mean
-    a, b = points[first], points[last]
-    points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
-    return replace(strokes, points=points.astype(np.float32))
-
-
-def are_straight(points: Floats, rows: IndexArray) -> Bools:
-    """Return which cubics, ``rows`` of points, lines are near."""
-    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
-    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
-    return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
 
 
 def lengths_of(strokes: Scene) -> Floats:

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.drawing.line_art import STROKE_STEPS, are_straight, lengths_of, refined
+from warpsplat.drawing.line_art import STROKE_STEPS, lengths_of, refined
 from warpsplat.drawing.picture import MARGIN
 from warpsplat.drawing.prices import CUBIC, LINE, MOVE
+from warpsplat.drawing.strokes.broad import OFF
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.lines import trace_ink
-from warpsplat.drawing.trace.grids import at_pixels
+from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import filters
@@ -29,9 +29,6 @@ SPOT, SPOT_SIDE = 1.5, 5
 
 SLENDER = 17.0
 """Square of the outline's length over the area of what may be strokes, at the least: a square has 16."""
-
-Flags = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float64]
 
 
 def with_strokes(scene: Scene, settings: Settings, run: Run) -> Scene:
@@ -70,7 +67,8 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
         return shape
     traced = replace(traced, canvas=canvas, colors=np.zeros_like(traced.colors))
     quiet = replace(run, on_progress=None, checkpoint=None)
-    strokes = refined(traced, Problem(shown, replace(settings, iterations=STROKE_STEPS)), quiet).scene
+    problem = Problem(shown, replace(settings, iterations=STROKE_STEPS))
+    strokes = _straight(refined(traced, problem, quiet).scene)
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
     # What a part covers of the pixels beside its mask belongs to it.
     grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
@@ -103,10 +101,30 @@ def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
     return _having(shape, ~gone[outline_part]).append(strokes)
 
 
+def _straight(strokes: Scene) -> Scene:
+    """Return strokes with straight and level lines where they nearly are."""
+    points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
+    first, last = rows[_is_straight(points, rows)][:, [0, 3]].T
+    for axis in (0, 1):
+        near = np.abs(points[first, axis] - points[last, axis]) < OFF
+        mean = (points[first[near], axis] + points[last[near], axis]) / 2
+        points[first[near], axis] = points[last[near], axis] = mean
+    a, b = points[first], points[last]
+    points[first + 1], points[first + 2] = (2 * a + b) / 3, (a + 2 * b) / 3
+    return replace(strokes, points=points.astype(np.float32))
+
+
+def _is_straight(points: Floats, rows: IndexArray) -> Bools:
+    """Return which cubics, ``rows`` of points, lines are near."""
+    chord, *handles = (points[rows[:, k]] - points[rows[:, 0]] for k in (3, 1, 2))
+    across = [np.abs(chord[:, 0] * handle[:, 1] - chord[:, 1] * handle[:, 0]) for handle in handles]
+    return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
+
+
 def _sizes(scene: Scene) -> Floats:
     """Return the bytes of the data of each contour, shape (contour,)."""
     rows = cubic_rows(scene)
-    pieces = np.where(are_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
+    pieces = np.where(_is_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
     owner = np.searchsorted(scene.starts, rows[:, 0], side="right") - 1
     return np.asarray(MOVE + np.bincount(owner, pieces, len(scene.starts) - 1), np.float64)
 
@@ -121,7 +139,7 @@ def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:
     return votes.argmax(axis=1)
 
 
-def _having(shape: Scene, chosen: Flags) -> Scene:
+def _having(shape: Scene, chosen: Bools) -> Scene:
     """Return a shape with the ``chosen`` contours; none if there are none."""
     counts = np.diff(shape.starts)
     points = shape.points[np.repeat(chosen, counts)]
