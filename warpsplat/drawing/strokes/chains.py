@@ -142,8 +142,22 @@ def traced(graph: Graph, chain: Chain) -> tuple[Floats, bool] | None:
     points = np.concatenate([_unbent(graph, edge) for edge in edges])
     closed = closed and len(points) > 0
     if not closed:
-        points = np.concatenate([edges[0].points[:1], points, edges[-1].points[-1:]])
+        start, end = edges[0].points[0], edges[-1].points[-1]
+        if len(points) > 3:
+            radius = float(np.median([edge.half_width for edge in edges]))
+            start, end = _ahead(points, start, radius), _ahead(points[::-1], end, radius)
+        points = np.concatenate([start[None], points, end[None]])
     return smoothed(points, closed=closed) if len(points) > 1 else None
+
+
+def _ahead(points: Floats, place: Floats, radius: float) -> Floats:
+    """Return where a line that goes on with ``points`` begins, if it comes straight from beside ``place``."""
+    direction = points[0] - points[min(len(points) - 1, max(4, round(2 * radius)))]
+    direction = direction / max(float(hypot(*direction)), 1e-9)
+    away = place - points[0]
+    if abs(float(away[0] * direction[1] - away[1] * direction[0])) > max(radius, 1.5):
+        return place
+    return np.asarray(points[0] + max(float((away * direction).sum()), 0.0) * direction)
 
 
 def _unbent(graph: Graph, edge: Edge) -> Floats:
