@@ -14,9 +14,7 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
 
-OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
-MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
 
 
 def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
@@ -42,30 +40,6 @@ def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
     return Pieces(np.concatenate(cubics), np.concatenate(lines))
 
 
-def with_joined_lines(contours: list[Pieces]) -> list[Pieces]:
-    """Return contours with one line for several that go on in the same direction."""
-    while True:
-        cubics, lines, before, first = _around(contours)
-        chord, here = cubics[:, 3] - cubics[before, 0], cubics[:, 0] - cubics[before, 0]
-        size, along = hypot(*chord.T), (here * chord).sum(axis=1)
-        off = np.abs(here[:, 0] * chord[:, 1] - here[:, 1] * chord[:, 0])
-        gone = lines & lines[before] & (along >= 0) & (along <= size * size) & (off <= OFF_LINE * size)
-        gone &= (size >= 1e-6) & ~gone[before] & np.repeat(np.diff(first) > 2, np.diff(first))
-        if not gone.any():
-            return contours
-        parts = np.split(gone, first[1:-1])
-        contours = [
-            _without(one, own) if own.any() else one for one, own in zip(contours, parts, strict=True)
-        ]
-
-
-def _without(contour: Pieces, gone: Bools) -> Pieces:
-    """Return a contour without the lines that are ``gone``: the one before each ends where it did."""
-    cubics, lines = contour.cubics[~gone], contour.lines[~gone]
-    ends = np.roll(cubics[:, 0], -1, axis=0)
-    return Pieces(np.where(lines[:, None, None], straight(cubics[:, 0], ends), cubics), lines)
-
-
 def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:
     """Return cubics of contours, which are lines, the cubic before each, and the first of each contour."""
     counts = np.array([len(contour.cubics) for contour in contours], np.int64)
@@ -84,12 +58,7 @@ def joints_of(contours: list[Pieces]) -> Ints:
     arriving, leaving = (cubics[:, 3] - cubics[:, 2])[before], cubics[:, 1] - cubics[:, 0]
     cross = np.abs(arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0])
     dot = (arriving * leaving).sum(axis=1)
-    # Bending a long handle by a small angle moves a curve by pixels.
-    length, length_before = hypot(*leaving.T), hypot(*arriving.T)
-    sine = cross / np.maximum(length * length_before, 1e-12)
-    length, length_before = np.where(lines, np.inf, length), np.where(line_before, np.inf, length_before)
-    moves_little = np.minimum(length, length_before) < MOST_MOVED / np.maximum(sine, 1e-12)
-    smooth = (cross <= SMOOTH_TANGENT * dot) & moves_little & ~(lines & line_before)
+    smooth = (cross <= SMOOTH_TANGENT * dot) & ~(lines & line_before)
     joints = np.full((len(cubics), 3), Joint.FREE, np.int32)
     joints[:, 0] = np.where(smooth, Joint.SMOOTH, Joint.CORNER)
     joints[lines, 1:] = Joint.LINE_HANDLE
