@@ -15,6 +15,7 @@ from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
 
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
+MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
 
 
 def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
@@ -58,7 +59,12 @@ def joints_of(contours: list[Pieces]) -> Ints:
     arriving, leaving = (cubics[:, 3] - cubics[:, 2])[before], cubics[:, 1] - cubics[:, 0]
     cross = np.abs(arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0])
     dot = (arriving * leaving).sum(axis=1)
-    smooth = (cross <= SMOOTH_TANGENT * dot) & ~(lines & line_before)
+    # Bending a long handle by a small angle moves a curve by pixels.
+    length, length_before = hypot(*leaving.T), hypot(*arriving.T)
+    sine = cross / np.maximum(length * length_before, 1e-12)
+    length, length_before = np.where(lines, np.inf, length), np.where(line_before, np.inf, length_before)
+    moves_little = np.minimum(length, length_before) < MOST_MOVED / np.maximum(sine, 1e-12)
+    smooth = (cross <= SMOOTH_TANGENT * dot) & moves_little & ~(lines & line_before)
     joints = np.full((len(cubics), 3), Joint.FREE, np.int32)
     joints[:, 0] = np.where(smooth, Joint.SMOOTH, Joint.CORNER)
     joints[lines, 1:] = Joint.LINE_HANDLE

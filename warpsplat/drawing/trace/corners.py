@@ -14,9 +14,10 @@ from warpsplat.portable.elementary import arctan2, hypot
 from warpsplat.portable.linear import principal_direction
 from warpsplat.scene.scene import ranges
 
-COMPARED, LEAST_TURN = 4.0, 28.0
-"""Length of outline on both sides that is compared [px], and the least turn of a corner [degrees], besides
-what the outline turns beside it: a small circle turns everywhere."""
+SCALES = ((4.0, 28.0), (2.2, 50.0))
+"""Lengths of outline on both sides that are compared [px], and the least turn of a corner [degrees], besides
+what the outline turns beside it: a small circle turns everywhere.
+"""
 
 LEAST_REACH = 1.2  # [px] of outline on each side, below which nothing is compared
 LEAST_POINTS = 5  # of a polyline with corners
@@ -61,18 +62,19 @@ def find_corners(lines: Polylines, scales: Floats, doubt: Floats | None = None) 
         doubt: How far off areas of pixels may be, shape (height, width); None: not at all.
     """
     strength = np.zeros(len(lines.points))
-    reach = np.minimum(COMPARED * scales, lines.totals / 6)
-    compared = np.flatnonzero((reach >= LEAST_REACH) & (lines.counts >= LEAST_POINTS))
-    which = np.repeat(compared, lines.counts[compared])
-    index = ranges(lines.first[compared], lines.counts[compared])
-    here, reach = lines.along[index], reach[which]
-    before, turn, after = _turns(lines, which, here, reach)
-    sign = np.sign(turn)
-    # The next corner of a staircase turns the other way.
-    excess = np.abs(turn) - 0.5 * (np.maximum(sign * before, 0) + np.maximum(sign * after, 0))
-    at_end = (here < reach * 0.6) | (here > lines.totals[which] - reach * 0.6)
-    excess[at_end & ~lines.closed[which]] = 0
-    strength[index] = excess / LEAST_TURN
+    for length, least in SCALES:
+        reach = np.minimum(length * scales, lines.totals / 6)
+        compared = np.flatnonzero((reach >= LEAST_REACH) & (lines.counts >= LEAST_POINTS))
+        which = np.repeat(compared, lines.counts[compared])
+        index = ranges(lines.first[compared], lines.counts[compared])
+        here, reach = lines.along[index], reach[which]
+        before, turn, after = _turns(lines, which, here, reach)
+        sign = np.sign(turn)
+        # The next corner of a staircase turns the other way.
+        excess = np.abs(turn) - 0.5 * (np.maximum(sign * before, 0) + np.maximum(sign * after, 0))
+        at_end = (here < reach * 0.6) | (here > lines.totals[which] - reach * 0.6)
+        excess[at_end & ~lines.closed[which]] = 0
+        strength[index] = np.maximum(strength[index], excess / least)
     return _located(lines, _peaks(lines, strength), BLUNT * scales, doubt)
 
 

@@ -246,7 +246,23 @@ def _extended(stretches: Stretches, seen: Ints, tails: Ints, vertices: Floats, k
     further = reached + UNDER * direction
     hidden = stretches.layers.cover.hides(stretches.rank[seen], further)
     reached = np.where(hidden[:, None], further, reached)
-    return np.where((count < 2) | (kinds == EDGE)[:, None], vertices, reached)
+    size = np.array(stretches.layers.cover.ranks.shape[::-1])
+    at_edge = _at_edge(middle, direction, vertices, size)
+    reached = np.where((kinds == EDGE)[:, None], at_edge, reached)
+    return np.where(count < 2, vertices, reached)
+
+
+def _at_edge(middle: Floats, direction: Floats, vertices: Floats, size: Ints) -> Floats:
+    """Return where lines meet the edge of the image, or ``vertices`` if that is far away."""
+    number = np.arange(len(vertices))
+    axis = np.where((vertices[:, 0] == 0) | (vertices[:, 0] == size[0]), 0, 1)
+    slope, edge = direction[number, axis], vertices[number, axis]
+    is_steep = np.abs(slope) >= 0.3
+    reached = middle + direction * ((edge - middle[number, axis]) / np.where(is_steep, slope, 1))[:, None]
+    reached = np.clip(reached, 0, size)
+    reached[number, axis] = edge
+    is_near = is_steep & (hypot(*(reached - vertices).T) < 1.5)
+    return np.where(is_near[:, None], reached, vertices)
 
 
 def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[int, Floats]:
