@@ -66,17 +66,20 @@ def _fitted(runs: list[Polyline], tolerances: Sequence[float], doubt: Floats | N
     return [Pieces(curves[low:high], lines[low:high]) for low, high in itertools.pairwise(bounds)]
 
 
-LEAST_LEVEL = 1.5  # [px] length of a line that is made horizontal or vertical
+LEVEL_SLOPE = 0.012  # up to which a line is made horizontal or vertical
+LEVEL_OFF = 1.2  # of its ends from that, over the tolerance, at the most
+LEAST_LEVEL = 1.5  # [px] length of such a line
 
 
 def _with_level_lines(pieces: Pieces, closed: bool, tolerance: float) -> Pieces:
-    """Return the pieces of a run, with lines made level or upright where they nearly are."""
+    """Return the pieces of a run, with lines made horizontal or vertical where they nearly are."""
     cubics, lines = pieces.cubics, pieces.lines
     count = len(cubics)
     for k in np.flatnonzero(lines).tolist():
         chord = cubics[k, 3] - cubics[k, 0]
         for axis in (0, 1):
-            if 0 < abs(chord[axis]) <= tolerance and abs(chord[1 - axis]) > LEAST_LEVEL:
+            limit = min(LEVEL_OFF * tolerance, LEVEL_SLOPE * abs(chord[1 - axis]) + 0.02)
+            if 0 < abs(chord[axis]) <= limit and abs(chord[1 - axis]) > LEAST_LEVEL:
                 value = 0.5 * (cubics[k, 0, axis] + cubics[k, 3, axis])
                 if closed or k > 0:
                     _move_end(cubics[(k - 1) % count, ::-1, axis], value)
