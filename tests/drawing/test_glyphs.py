@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import warpsplat
-from warpsplat.drawing import draft
+from warpsplat.drawing import draw
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.scene import Canvas, FloatArray, Scene
@@ -137,7 +137,7 @@ def test_glyphs_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
         looked.append(1)
         return find_glyphs(image)
 
-    monkeypatch.setattr(draft, "find_glyphs", find)
+    monkeypatch.setattr(draw, "find_glyphs", find)
     warpsplat.vectorize(page(), subject="drawing", quality="draft", max_bytes=900)
     assert looked == [1]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.constraints import Drawing, Finished
 from warpsplat.drawing.denoise import LIGHTNESS, has_blurred_colors
-from warpsplat.drawing.tidy import Finished, finish_drawing
+from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.fit.problem import Run
 from warpsplat.scene import FloatArray
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +32,10 @@ MIN_LENGTH = 1e-6
 
 MIN_HANDLE = 0.05
 """[canvas units] a handle of length 0 would have no direction, and the joint would be a corner."""
+
+
+DRAFT_GRID = 8.0
+"""View box units per pixel of a draft, and until the grid is chosen: a trace is no nearer to the image."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,17 @@ class Drawing:
     def cubics(self) -> Floats:
         """Return the control points of the cubics, shape (cubic, 4, 2)."""
         return with_ends(self.scene.points.astype(np.float64), self.following())
+
+
+class Finished(NamedTuple):
+    """A drawing as it is written."""
+
+    drawing: Drawing
+    """Rounded to the grid, unless it is a draft."""
+    per_pixel: float
+    """View box units per pixel."""
+    psnr: float = math.nan
+    """PSNR of the exact render before it is rounded [dB]; NaN if it was not fitted."""
 
 
 def with_ends(points: Floats, following: Links) -> Floats:

@@ -1,4 +1,4 @@
-"""Drawings, traced, fitted and tidied."""
+"""Drawings, traced and, unless they are drafts, fitted and tidied."""
 
 from __future__ import annotations
 
@@ -9,22 +9,13 @@ from functools import partial
 from typing import Any
 
 from warpsplat.drawing.byte_limit import Sketch, best_within
-from warpsplat.drawing.chroma import finish_by_lightness
-from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.draft import (
-    as_fit,
-    byte_price,
-    draw_pixels,
-    glyphs_of,
-    limited,
-    most_shapes,
-    trace_in_time,
-)
+from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
+from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import Sheet
+from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
-from warpsplat.drawing.tidy import Finished
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished
 from warpsplat.fit.palette import solid_shapes
@@ -50,14 +41,18 @@ log = logging.getLogger(__name__)
 
 
 def draw_regions(problem: Problem, run: Run) -> Fit:
-    """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes."""
+    """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes.
+
+    A draft, which is not tidied, is the trace, and needs no Warp.
+    """
     settings, limit = problem.settings, problem.settings.max_bytes
-    most = most_shapes(settings)
+    most = None if settings.simplify else settings.curves
     picture = Picture.of(problem.target)
     announce_trace(picture, settings)
-    sheet, rest = glyphs_of(picture.pixels)
+    is_thin = any(margins(picture.pixels, THIN_SIDE))
+    sheet, rest = (None, picture.pixels) if is_thin else find_glyphs(picture.pixels)
     if sheet:
-        made = _drawn_with_sheet(picture, settings, run, sheet, rest)
+        made = _drawn_with_sheet(picture, settings, run, sheet, rest, most)
         if made and (not limit or _size(made, settings) <= limit):
             return made
     traced = trace_regions(picture.pixels, picture.noise, settings, run, most)
@@ -78,7 +73,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         )
 
     def simpler(drawing: Drawing, price: float) -> Sketch:
-        done = finish(drawing, next(parts), tidy=True, price=price * byte_price(settings))
+        done = finish(drawing, next(parts), price=price * byte_price(settings))
         return _sketch(problem, picture, run, done)
 
     first = sketch_of(finish(traced, next(parts)), most)
@@ -88,25 +83,26 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
-    """Finish a drawing as ``finish_by_lightness``, as the settings say where ``options`` do not."""
-    usual = {
-        "finest": finest(settings),
-        "tidy": settings.tidy,
-        "price": byte_price(settings),
-        "symbols": settings.symbols,
-    }
+    """Finish a drawing as ``finish_by_lightness``, as the settings say where ``options`` do not.
+
+    A draft stays as it is.
+    """
+    if not settings.tidy:
+        return Finished(drawing, min(DRAFT_GRID, finest(settings)))
+    from warpsplat.drawing.chroma import finish_by_lightness
+
+    usual = {"finest": finest(settings), "price": byte_price(settings), "symbols": settings.symbols}
     return finish_by_lightness(target, drawing, run, **(usual | options))
 
 
 def _drawn_with_sheet(
-    picture: Picture, settings: Settings, run: Run, sheet: Sheet, rest: FloatArray
+    picture: Picture, settings: Settings, run: Run, sheet: Sheet, rest: FloatArray, most: int | None
 ) -> Fit | None:
     """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes.
 
-    Return None if these are more paths than are allowed.
+    Return None if these are more paths than ``most``.
     """
     found, others = sheet.trace(), trace_regions(rest, picture.noise, settings, run, None)
-    most = most_shapes(settings)
     if most is not None and len(sheet.placed(found.scene, others.scene)) > most:
         return None
     copies = len(sheet.copies) / len(sheet.corners)
@@ -146,7 +142,7 @@ def announce_fit(nodes: int, picture: Picture, settings: Settings) -> None:
 
 def _announce(settings: Settings, work: str, seconds: float) -> None:
     """Say so if work will take long and has no time limit, and what makes it shorter."""
-    if seconds > LONG and settings.time_budget is None:
+    if seconds > LONG and settings.time_budget is None and settings.tidy:
         how = "--time-budget or --quality draft make it shorter"
         log.warning("%s takes about %.0f s; %s", work, seconds, how)
 
@@ -185,12 +181,14 @@ def trace_regions(
 def _sketch(problem: Problem, picture: Picture, run: Run, done: Finished) -> Sketch:
     """Return a finished drawing at the size of the whole image."""
     scene, per_pixel = _whole(done.drawing.scene, done.per_pixel, picture, problem.settings, run)
-    if problem.settings.max_bytes or any(margins(picture.pixels, THIN_SIDE)) or math.isnan(done.psnr):
+    settings, is_known = problem.settings, not math.isnan(done.psnr)
+    is_compared = settings.max_bytes or any(margins(picture.pixels, THIN_SIDE))
+    if is_compared or (settings.tidy and not is_known):
         made = as_fit(scene, per_pixel, problem, run)
     else:  # nothing to compare it with
         psnr = done.psnr - 10 * float(elementary.log10(picture.share))
         made = Fit(scene, per_pixel, psnr, psnr, 0, run.stopped())
-    return Sketch(made, _size(made, problem.settings), done.drawing)
+    return Sketch(made, _size(made, settings), done.drawing if settings.tidy else None)
 
 
 def _whole(
@@ -198,7 +196,7 @@ def _whole(
 ) -> tuple[Scene, float]:
     """Return a scene of a picture, and its grid, at the size of the image."""
     scene = picture.placed(scene)
-    if settings.strokes and not run.over():
+    if settings.strokes and settings.tidy and not run.over():
         from warpsplat.drawing.pen import with_strokes
 
         scene = with_strokes(scene, settings, run)

@@ -59,9 +59,6 @@ FRINGE, BALANCE, BEND = 0.08, 0.12, 0.4
 """Shares in red and blue that differ by ``FRINGE`` at least are a fringe if their sums differ by no more than
 ``BALANCE`` of green's, and green is off the mean of the two by no more than ``BEND`` of their difference."""
 
-WHOLE, HARD = 0.9, 0.1
-"""Share of one colour from which on a pixel is no mixture, and of mixtures up to which edges are hard."""
-
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float64]
@@ -205,8 +202,6 @@ def _glyph(patch: Floats, ground: Floats) -> _Glyph | None:
         return None
     shares = (away * extreme).sum(axis=2) / (extreme * extreme).sum()
     if np.abs(away - shares[..., None] * extreme).max() <= MIXED:
-        if _is_hairline(shares):
-            return None
         return _Glyph(shares, extreme, ground, [])
     colored = extreme[:3]
     if np.abs(colored).min() < LEAST_CONTRAST or (len(ground) == 4 and extreme[3] != 0):
@@ -216,14 +211,6 @@ def _glyph(patch: Floats, ground: Floats) -> _Glyph | None:
     is_fringe = spread.max() >= FRINGE and bend.sum() <= BEND * spread.sum()
     is_fringe &= abs(red.sum() - blue.sum()) <= BALANCE * green.sum()
     return _Glyph((red + green + blue) / 3, extreme, ground, []) if is_fringe else None
-
-
-def _is_hairline(shares: Floats) -> bool:
-    """Return whether a glyph has hard edges and is nowhere two pixels wide: its outline is anyone's guess."""
-    own = shares >= 0.5
-    mixed = (shares > 1 - WHOLE) & (shares < WHOLE)
-    is_thick = own[1:, 1:] & own[:-1, 1:] & own[1:, :-1] & own[:-1, :-1]
-    return bool(mixed.sum() <= HARD * own.sum() and not is_thick.any())
 
 
 def _inks(glyphs: list[_Glyph]) -> dict[bytes, Floats]:

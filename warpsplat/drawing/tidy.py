@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from warpsplat.alpha import squares
 from warpsplat.drawing import model
 from warpsplat.drawing.cells import by_cell
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links
+from warpsplat.drawing.constraints import DRAFT_GRID, Constraints, Drawing, Finished, Flags, Floats, Links
 from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
@@ -39,26 +37,12 @@ FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
 FIRST_FAR, SECOND_FAR = 4, 3
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
 
-DRAFT_GRID = 10.0
-"""View box units per pixel until the grid is chosen."""
-
 RECOVERED = 10.0
 """Largest error of an edit before refitting, over the largest one after: refitting recovers most of it, and
 of a larger one samples cannot tell."""
 
 Worth = Callable[[float, float], float]
 """Gives what a byte is worth at an error and a size, as ``prices.worth``."""
-
-
-class Finished(NamedTuple):
-    """A drawing as it is written."""
-
-    drawing: Drawing
-    """Rounded to the grid."""
-    per_pixel: float
-    """View box units per pixel."""
-    psnr: float = math.nan
-    """PSNR of the exact render before it is rounded [dB]; NaN if it was not fitted."""
 
 
 def finish_drawing(

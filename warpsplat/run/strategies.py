@@ -48,7 +48,7 @@ STRATEGIES = {
     "goal": Strategy("warpsplat.search.goal:search_goal", keeps_order=True),
     "drawing": Strategy("warpsplat.drawing.draw:draw_regions", keeps_order=True, traces=True),
     "draft": Strategy(
-        "warpsplat.drawing.draft:draft_regions", keeps_order=True, traces=True, uses_device=False
+        "warpsplat.drawing.draw:draw_regions", keeps_order=True, traces=True, uses_device=False
     ),
     "line": Strategy("warpsplat.drawing.line_art:draw_lines", keeps_order=True, traces=True),
     "pixel": Strategy(

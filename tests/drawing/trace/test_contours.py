@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
 from warpsplat.drawing.trace.curves import Pieces, straight
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.scene.attributes import Joint
@@ -13,23 +13,6 @@ from warpsplat.scene.attributes import Joint
 def ring(*corners: tuple[float, float]) -> Pieces:
     ends = np.array(corners, float)
     return Pieces(straight(ends, np.roll(ends, -1, axis=0)), np.ones(len(ends), np.bool_))
-
-
-def test_lines_that_go_on_are_one() -> None:
-    """However many there are, also around the beginning; a triangle is left as it is."""
-    square = ring((5, 0), (10, 0.02), (10, 4), (10, 7), (10, 9), (10, 10), (0, 10), (0, 0))
-    made, triangle = with_joined_lines([square, ring((0, 0), (9, 0), (0, 9))])
-    np.testing.assert_allclose(made.cubics[:, 0], [(10, 0.02), (10, 10), (0, 10), (0, 0)])
-    np.testing.assert_allclose(made.cubics[:, 3], np.roll(made.cubics[:, 0], -1, axis=0))
-    assert made.lines.all() and len(triangle.cubics) == 3
-
-
-def test_lines_beside_curves_stay() -> None:
-    bent = ring((0, 0), (5, 0), (10, 0), (10, 10))
-    bent.cubics[1, 1:3, 1] = 1
-    curved = Pieces(bent.cubics, np.array([True, False, True, True]))
-    (made,) = with_joined_lines([curved])
-    np.testing.assert_array_equal(made.cubics, curved.cubics)
 
 
 def test_parts_are_joined_by_lines() -> None:

@@ -17,7 +17,6 @@ LINE_COST, CUBIC_COST = 1.0, 1.4  # what a piece counts, about its bytes
 ERROR_COST = 0.35  # what an error of the size of the tolerance counts for each piece
 FORCED_COST = 2 * CUBIC_COST  # of a cubic between two knots that are neighbours, whatever its error
 MOST_KNOTS = 48  # between which all curves are tried
-STRIDE, FAR = 4, 2.0  # between knots whose pairs are tried first; tolerances of a piece that is far off
 PAIRS = 1 << 17  # of knots that are looked at together, about, which bounds the memory
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
 
@@ -85,24 +84,14 @@ def _few(first: Ints) -> tuple[Ints, Ints]:
 def _chains(spans: Spans, tolerances: Floats) -> CurvePieces:
     """Return cheapest chains as ``cheapest_chains``, of spans with few knots.
 
-    A chain of one piece, if there is one, is cheaper than any of two, and one of two that costs less than
-    three lines is cheaper than any of three: most spans need no other candidates.
+    A chain of one piece, if there is one, is cheaper than any other: many spans need no other candidates.
     """
     first, last = spans.first[:-1], spans.first[1:] - 1
     number = np.arange(len(first))
     whole = _candidates(spans, number, first, last, tolerances)
     is_enough = np.isfinite(whole.costs) | (last == first + 1)
     rest = number[~is_enough]
-    inner = last[rest] - first[rest] - 1
-    owner, middle = np.repeat(rest, inner), ranges(first[rest] + 1, inner)
-    heads = _candidates(spans, owner, first[owner], middle, tolerances)
-    tails = _candidates(spans, owner, middle, last[owner], tolerances)
-    both = heads.costs + tails.costs
-    order = np.lexsort((both, owner))
-    best = order[np.append(True, np.diff(owner[order]) != 0)[: len(order)]]
-    best = best[(both[best] < 3 * LINE_COST) | (inner[np.searchsorted(rest, owner[best])] == 1)]
-    rest = rest[~np.isin(rest, owner[best])]
-    found = [whole.take(is_enough), heads.take(best), tails.take(best)]
+    found = [whole.take(is_enough)]
     pairs = np.cumsum((last - first)[rest] ** 2)
     for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):
         found.append(_cheapest(spans, group, tolerances))
@@ -113,17 +102,8 @@ def _chains(spans: Spans, tolerances: Floats) -> CurvePieces:
 def _cheapest(spans: Spans, group: Ints, tolerances: Floats) -> CurvePieces:
     """Return the cheapest chains of some spans, by dynamic programming over pairs of knots."""
     first, last = spans.first[group], spans.first[group + 1] - 1
-    number, begin, end = _pairs(last - first + 1)
-    # What is longer than a piece that is far off is not tried.
-    steps = (last - first) // STRIDE + 1
-    coarse, low, high = _pairs(steps)
-    near = np.ones((len(group), *2 * (int(steps.max(initial=1)),)), np.bool_)
-    knots = first[coarse] + STRIDE * low, first[coarse] + STRIDE * high
-    near[coarse, low, high] = np.isfinite(_candidates(spans, group[coarse], *knots, FAR * tolerances).costs)
-    inner = -(-begin // STRIDE), end // STRIDE
-    tried = np.flatnonzero((inner[1] <= inner[0]) | near[number, np.minimum(inner[0], inner[1]), inner[1]])
-    number, level = number[tried], begin[tried]
-    begin, end = first[number] + level, first[number] + end[tried]
+    number, level, end = _pairs(last - first + 1)
+    begin, end = first[number] + level, first[number] + end
     pieces = _candidates(spans, group[number], begin, end, tolerances)
     # A curve may go to the next knot, whatever its error.
     costs = np.where((end == begin + 1) & ~np.isfinite(pieces.costs), FORCED_COST, pieces.costs)

@@ -14,7 +14,6 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
 
-OFF_LINE = 0.05  # [px] distance of the joint of two lines up to which they are one
 SMOOTH_TANGENT = 0.14054083  # of the angle between handles up to which a joint is smooth: 8 degrees
 MOST_MOVED = 0.6  # [px] that a handle moves when its smooth joint is made straight, at the most
 
@@ -40,30 +39,6 @@ def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
             cubics.append(straight(last, goal)[None])
             lines.append(np.ones(1, np.bool_))
     return Pieces(np.concatenate(cubics), np.concatenate(lines))
-
-
-def with_joined_lines(contours: list[Pieces]) -> list[Pieces]:
-    """Return contours with one line for several that go on in the same direction."""
-    while True:
-        cubics, lines, before, first = _around(contours)
-        chord, here = cubics[:, 3] - cubics[before, 0], cubics[:, 0] - cubics[before, 0]
-        size, along = hypot(*chord.T), (here * chord).sum(axis=1)
-        off = np.abs(here[:, 0] * chord[:, 1] - here[:, 1] * chord[:, 0])
-        gone = lines & lines[before] & (along >= 0) & (along <= size * size) & (off <= OFF_LINE * size)
-        gone &= (size >= 1e-6) & ~gone[before] & np.repeat(np.diff(first) > 2, np.diff(first))
-        if not gone.any():
-            return contours
-        parts = np.split(gone, first[1:-1])
-        contours = [
-            _without(one, own) if own.any() else one for one, own in zip(contours, parts, strict=True)
-        ]
-
-
-def _without(contour: Pieces, gone: Bools) -> Pieces:
-    """Return a contour without the lines that are ``gone``: the one before each ends where it did."""
-    cubics, lines = contour.cubics[~gone], contour.lines[~gone]
-    ends = np.roll(cubics[:, 0], -1, axis=0)
-    return Pieces(np.where(lines[:, None, None], straight(cubics[:, 0], ends), cubics), lines)
 
 
 def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:

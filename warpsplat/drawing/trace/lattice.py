@@ -95,8 +95,7 @@ def find_axis(levels: Ints, axis: int, *, soft: bool = False) -> Axis | None:
     # Noise and shading are everywhere, edges on few lines.
     edges = np.maximum(steps - np.sort(steps)[len(steps) // 2], 0)
     total = int(edges.sum())
-    # Few edges are in step by chance.
-    if not total or total**2 < CELLS[0] * float(np.square(edges.astype(np.float64)).sum()):
+    if not total:
         return None
     turns = np.arange(int(np.ceil(TURN / longest)), int(TURN / SHORTEST) + 1, 1 + (size > PART // 2))
     numbers = np.arange(len(edges)) + first + 1

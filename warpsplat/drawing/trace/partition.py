@@ -75,9 +75,7 @@ def find_partition(regions: Regions) -> Partition:
     lead = np.ones(painted.shape, np.float32)
     down, right = np.ogrid[:scale, :scale]
     cells = scale * rows[:, None, None] + down, scale * columns[:, None, None] + right
-    painted[cells], runner_up, lead[cells] = _leading(shares, rows, columns, scale)
-    doubtful = _doubtful(painted, cells, shares.doubt[rows, columns], scale)
-    painted[cells] = np.where(doubtful, runner_up, painted[cells])
+    painted[cells], lead[cells] = _leading(shares, rows, columns, scale)
     down, right = np.ogrid[: painted.shape[0], : painted.shape[1]]
     fills = shares.colors.at(painted, *np.broadcast_arrays(down // scale, right // scale))
     labels = components(painted, fills)
@@ -98,33 +96,13 @@ def _in_cells(values: Any, scale: int) -> Any:
     return np.repeat(np.repeat(values, scale, axis=0), scale, axis=1)
 
 
-def _doubtful(painted: Ints, cells: tuple[Ints, Ints], doubt: Floats, scale: int) -> Bools:
-    """Return which cells are in regions that are smaller than what their shares may be off.
-
-    Args:
-        painted: The colouring of each cell of the image.
-        cells: Rows and columns of the cells of some pixels, broadcast to (pixel, scale, scale).
-        doubt: How far off shares of these pixels may be, shape (pixel,).
-        scale: Cells along a pixel.
-    """
-    parts = components(painted, painted[..., None].astype(np.float32))
-    sizes, own = np.bincount(parts.reshape(-1)), parts[cells]
-    known = np.bincount(own.reshape(-1), minlength=len(sizes))
-    touched = np.unique(
-        own.astype(np.int64).reshape(len(own), scale**2) + len(sizes) * np.arange(len(own))[:, None]
-    )
-    pixel, part = np.divmod(touched, len(sizes))
-    off = np.bincount(part, doubt[pixel], len(sizes)) * scale**2
-    return ((known == sizes) & (sizes < off))[own]
-
-
-def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Ints, Ints, Floats]:
-    """Return the colouring of each cell of some pixels, the next one, and how far it is ahead of that.
+def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Ints, Floats]:
+    """Return the colouring of each cell of some pixels, and how far it is ahead of the next one.
 
     Shape (pixel, scale, scale) each.
     """
     shape = len(rows), scale, scale
-    painted, runner_up = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    painted = np.zeros(shape, np.int32)
     most, next_ = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.float32)
     one, other = shares.first[rows, columns], shares.second[rows, columns]
     numbers = numbers_in(np.concatenate([one, other])).tolist()
@@ -133,20 +111,17 @@ def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Int
     for k in numbers:
         if len(numbers) == 2:  # one is where the other is not
             values = _level(shares.of(k, np.s_[:, :]), rows, columns, shares.doubt, scale)
-            is_first = values >= 0.5
-            return np.where(is_first, *numbers), np.where(is_first, *numbers[::-1]), np.abs(2 * values - 1)
+            return np.where(values >= 0.5, *numbers), np.abs(2 * values - 1)
         own = (one == k) | (other == k)
         box = _around(rows[own], columns[own])
         share, number = shares.of(k, box), index[box]
         near_rows, near_columns = np.nonzero(dilated(share > 0, 3) & (number >= 0))
         some = number[near_rows, near_columns]
         values = _level(share, near_rows, near_columns, shares.doubt[box], scale)
-        is_most, is_next = values > most[some], values > next_[some]
-        runner_up[some] = np.where(is_most, painted[some], np.where(is_next, k, runner_up[some]))
-        painted[some] = np.where(is_most, k, painted[some])
+        painted[some] = np.where(values > most[some], k, painted[some])
         next_[some] = np.maximum(next_[some], np.minimum(values, most[some]))
         most[some] = np.maximum(values, most[some])
-    return painted, runner_up, most - next_
+    return painted, most - next_
 
 
 def _around(rows: Ints, columns: Ints) -> tuple[slice, slice]:

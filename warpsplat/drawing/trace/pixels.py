@@ -11,15 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, linked_components
 from warpsplat.drawing.trace.lattice import MOST_COLORS, SNAP, Lattice, find_lattice
+from warpsplat.drawing.trace.planar import find_loops
 from warpsplat.errors import ImageError
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
 from warpsplat.scene.scene import starts_of
 
 MOST_CELLS = 262_144  # of pixel art: nobody would edit the outlines of more
 
-Point = tuple[int, int]
 STRIP_ROWS = 64  # compared at once, which bounds the memory
 MOST_CORNERS = 32_000  # of a shape
 FINE = 0.25  # [px] that the borders of cells are rounded to
@@ -110,53 +110,28 @@ def cell_size(image: npt.NDArray[Any]) -> int:
     return int(np.gcd.reduce(np.concatenate(changes(image))))
 
 
-def outlines(inside: Bools) -> list[list[Point]]:
-    """Return the corners (x, y) of closed polygons around the cells ``inside``, shape (row, column).
+def outlines(inside: Bools) -> list[Ints]:
+    """Return the corners (corner, 2), x and y, of closed polygons around the cells ``inside``, (row, column).
 
     The inside lies on the right of each edge, so that holes run the other way round. Cells that touch at a
     corner only are outlined separately.
     """
-    padded = np.pad(inside, 1)
-    edges: dict[Point, list[Point]] = {}
-
-    def add(mask: Bools, start: Point, end: Point) -> None:
-        for y, x in np.argwhere(mask).tolist():
-            edges.setdefault((x + start[0], y + start[1]), []).append((x + end[0], y + end[1]))
-
-    core = padded[1:-1, 1:-1]
-    add(core & ~padded[:-2, 1:-1], (0, 0), (1, 0))
-    add(core & ~padded[1:-1, 2:], (1, 0), (1, 1))
-    add(core & ~padded[2:, 1:-1], (1, 1), (0, 1))
-    add(core & ~padded[1:-1, :-2], (0, 1), (0, 0))
-    found = []
-    while edges:
-        start = next(iter(edges))
-        ring = [start, _take_edge(edges, start, None)]
-        while ring[-1] != start:
-            ring.append(_take_edge(edges, ring[-1], ring[-2]))
-        around = zip([ring[-2], *ring[:-2]], ring[:-1], ring[1:], strict=True)
-        found.append([b for a, b, c in around if (b[0] - a[0], b[1] - a[1]) != (c[0] - b[0], c[1] - b[1])])
-    return found
+    _, parts = linked_components(inside[:, 1:], inside[1:], inside)
+    loops = find_loops(parts, inside[..., None].astype(np.float32), np.ones(int(parts.max()) + 1, np.bool_))
+    loop = np.repeat(np.arange(len(loops)), np.diff(loops.first))
+    before = np.arange(len(loop)) - 1
+    before[loops.first[:-1]] = loops.first[1:] - 1
+    turns = loops.directions != loops.directions[before]
+    return np.split(loops.vertices[turns], np.cumsum(np.bincount(loop[turns]))[:-1])
 
 
-def _take_edge(edges: dict[Point, list[Point]], at: Point, before: Point | None) -> Point:
-    """Remove an edge that leaves ``at``, of two the one that turns right, and return its end."""
-    ends = edges[at]
-    end = ends[0]
-    if len(ends) > 1 and before is not None:
-        dx, dy = at[0] - before[0], at[1] - before[1]
-        end = (at[0] - dy, at[1] + dx)
-    ends.remove(end)
-    if not ends:
-        del edges[at]
-    return end
-
-
-def polygons(inside: Bools) -> list[list[list[Point]]]:
+def polygons(inside: Bools) -> list[list[Ints]]:
     """Return the outlines of cells as sets of polygons with no more than ``MOST_CORNERS`` each.
 
     One set if that is enough; otherwise the cells are halved across their longer side, until it is.
     """
+    if not inside.any():
+        return []
     whole = outlines(inside)
     height, width = inside.shape
     if sum(map(len, whole)) <= MOST_CORNERS:
@@ -165,17 +140,12 @@ def polygons(inside: Bools) -> list[list[list[Point]]]:
         halves = [(inside[: height // 2], 0, 0), (inside[height // 2 :], 0, height // 2)]
     else:
         halves = [(inside[:, : width // 2], 0, 0), (inside[:, width // 2 :], width // 2, 0)]
-    return [
-        [[(x + left, y + top) for x, y in ring] for ring in rings]
-        for half, left, top in halves
-        for rings in polygons(half)
-        if rings
-    ]
+    return [[ring + (left, top) for ring in rings] for half, left, top in halves for rings in polygons(half)]
 
 
-def _lines(corners: list[Point], cells: PixelArt) -> Floats:
+def _lines(corners: Ints, cells: PixelArt) -> Floats:
     """Return a polygon as a ring of cubics, with handles at the thirds of its lines."""
-    columns, rows = np.asarray(corners).T
+    columns, rows = corners.T
     start = np.stack([cells.across[columns], cells.down[rows]], axis=1)
     way = np.roll(start, -1, axis=0) - start
     return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)

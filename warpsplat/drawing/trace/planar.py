@@ -22,14 +22,14 @@ from warpsplat.drawing.trace.grids import (
 
 RIGHT, DOWN, LEFT, UP = range(4)
 
-STEPS = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
-"""x and y of a crack by its direction."""
-
 INSIDE = np.array([(0, 0), (-1, 0), (-1, -1), (0, -1)])
 """x and y of the pixel on the right of a crack by its direction, from the vertex where it begins."""
 
-OUTSIDE = np.array([(0, -1), (0, 0), (-1, 0), (-1, -1)])
+OUTSIDE = np.roll(INSIDE, 1, axis=0)
 """The same on its left."""
+
+STEPS = INSIDE - np.roll(INSIDE, -1, axis=0)
+"""x and y of a crack by its direction."""
 
 
 @dataclass(frozen=True)

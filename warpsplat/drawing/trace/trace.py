@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import straight as straight_color
 from warpsplat.drawing.trace.colors import with_best_colors
-from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged, with_joined_lines
+from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, unchecked
@@ -157,13 +157,7 @@ def _fitted(
         (region, assembled([next(fitted) if isinstance(part, Polyline) else part for part in outline]))
         for region, outline in scaled
     ]
-    known = [(region, contour) for region, contour in found if contour is not None]
-    joined = with_joined_lines([contour for _, contour in known])
-    return [
-        (region, contour)
-        for (region, _), contour in zip(known, joined, strict=True)
-        if len(contour.cubics) > 1
-    ]
+    return [(region, contour) for region, contour in found if contour and len(contour.cubics) > 1]
 
 
 def _doubt_along(doubt: Floats, points: Floats) -> float:
