@@ -7,7 +7,7 @@ import pytest
 
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.corners import find_corners
-from warpsplat.drawing.trace.curves import Pieces, fit_polylines
+from warpsplat.drawing.trace.curves import Pieces, areas_of, fit_circles, fit_polylines
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.spans import Polyline
@@ -49,11 +49,21 @@ def count_corners(points: Floats) -> int:
 
 
 @pytest.mark.parametrize("radius", [3.0, 12.0, 40.0])
-def test_a_circle_is_few_cubics(radius: float) -> None:
+def test_a_circle_is_four_cubics(radius: float) -> None:
     points = ring(radius) + noise(200, 2)
     pieces = fitted(points)
-    assert len(pieces.cubics) <= 4 and not pieces.lines.any()
-    assert np.abs(np.hypot(*(sampled(pieces.cubics) - 50).T) - radius).max() < 0.2
+    assert len(pieces.cubics) == 4 and not pieces.lines.any()
+    assert np.abs(np.hypot(*(sampled(pieces.cubics) - 50).T) - radius).max() < 0.03
+    ends = pieces.cubics[:, 0] - pieces.cubics[:, 0].mean(axis=0)
+    assert (np.abs(ends) < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
+
+
+def test_circles_keep_their_way_round_and_squares_and_ellipses_are_none() -> None:
+    square = polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float))
+    found = fit_circles([square, ring(20), ring(20)[::-1], ring(20, squeeze=0.9), square[:4]], 0.2)
+    assert sorted(found) == [1, 2]
+    one, other = areas_of(np.stack([sampled(found[number]) for number in (1, 2)]))
+    assert one > 1250 and abs(one + other) < 1e-6
 
 
 def test_a_polygon_is_lines_between_its_corners() -> None:

@@ -10,7 +10,14 @@ import numpy as np
 
 from warpsplat.drawing.trace.cheapest import cheapest_chains
 from warpsplat.drawing.trace.grids import Bools, Floats
+from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.spans import Polyline, cut_at_corners
+from warpsplat.portable.elementary import hypot
+from warpsplat.scene.geometry import ARC_HANDLE
+
+AROUND = 64  # points of an outline that tell whether it is a circle
+QUARTER = np.array([(1, 0), (1, ARC_HANDLE), (ARC_HANDLE, 1), (0, 1)])
+QUARTERS = np.stack([QUARTER, QUARTER[:, ::-1] * (-1, 1), -QUARTER, QUARTER[:, ::-1] * (1, -1)])
 
 
 @dataclass(frozen=True)
@@ -33,13 +40,36 @@ def fit_polylines(
         tolerances: Largest distance of a point of each from its curve [px].
         doubt: As for ``find_corners``.
     """
-    if not runs:
-        return []
-    curves = _fitted(runs, tolerances, doubt)
-    return [
-        _with_level_lines(pieces, run.closed, tolerance)
-        for pieces, run, tolerance in zip(curves, runs, tolerances, strict=True)
-    ]
+    found: list[Pieces | None] = [_polygon(run) for run in runs]
+    rings = [i for i, run in enumerate(runs) if run.closed and not run.is_polygon]
+    most = [tolerances[ring] for ring in rings]
+    for number, circle in fit_circles([runs[ring].points for ring in rings], most).items():
+        found[rings[number]] = Pieces(circle, np.zeros(4, np.bool_))
+    rest = [i for i, pieces in enumerate(found) if pieces is None]
+    if rest:
+        curves = _fitted([runs[i] for i in rest], [tolerances[i] for i in rest], doubt)
+        for i, pieces in zip(rest, curves, strict=True):
+            found[i] = _with_level_lines(pieces, runs[i].closed, tolerances[i])
+    return [pieces for pieces in found if pieces is not None]
+
+
+def fit_circles(rings: list[Floats], tolerances: Sequence[float]) -> dict[int, Floats]:
+    """Return the four cubics of each closed outline (point, 2) that is a circle, by its number.
+
+    ``tolerances``: how far points of each may be from it [px].
+    """
+    lines, which = Polylines.joined(rings, [True] * len(rings)), np.repeat(np.arange(len(rings)), AROUND)
+    places = lines.totals[which] * np.tile(np.arange(AROUND) / AROUND, len(rings))
+    points = lines.at(which, places).reshape(-1, AROUND, 2)
+    center = points.mean(axis=1)
+    away = hypot(*(points - center[:, None]).transpose(2, 0, 1))
+    radius = away.mean(axis=1)
+    near = np.flatnonzero(np.abs(away - radius[:, None]).max(axis=1) <= np.asarray(tolerances)).tolist()
+    made = {i: center[i] + radius[i] * QUARTERS for i in near}
+    return {
+        i: made[i] if area > 0 else made[i][::-1, ::-1]
+        for i, area in zip(near, areas_of(points[near]), strict=True)
+    }
 
 
 def areas_of(points: Floats) -> Floats:
@@ -54,8 +84,15 @@ def straight(start: Floats, end: Floats) -> Floats:
     return start[..., None, :] + (end - start)[..., None, :] * (np.arange(4)[:, None] / 3)
 
 
+def _polygon(run: Polyline) -> Pieces | None:
+    if not run.is_polygon:
+        return None
+    cubics = straight(run.points[:-1], run.points[1:])
+    return Pieces(cubics, np.ones(len(cubics), np.bool_))
+
+
 def _fitted(runs: list[Polyline], tolerances: Sequence[float], doubt: Floats | None) -> list[Pieces]:
-    """Return the cheapest lines and cubics for each run."""
+    """Return the cheapest lines and cubics for each run, no polygons."""
     spans = cut_at_corners(runs, tolerances, doubt)
     chains = cheapest_chains(spans, np.asarray(tolerances)[spans.owner])
     owner = spans.owner[chains.span]

@@ -31,6 +31,8 @@ class Polyline:
     start: Floats | None = None
     """Where an open one begins, shape (2,)."""
     end: Floats | None = None
+    is_polygon: bool = False
+    """Whether the points are corners."""
 
     def scaled(self, factor: float) -> Polyline:
         """Return the outline at another size."""
@@ -76,7 +78,7 @@ def cut_at_corners(
     """Return the spans of runs, in order along each; smooth rings come last.
 
     Args:
-        runs: Parts of outlines.
+        runs: No polygons.
         tolerances: Of the curves that are to be fitted to each [px]; for coarser ones corners are broader.
         doubt: As for ``find_corners``.
     """

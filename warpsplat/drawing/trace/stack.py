@@ -24,6 +24,7 @@ from warpsplat.scene.scene import ranges, starts_of
 SEEN, EDGE, HIDDEN = range(3)
 """The side across a crack: a lower region, the outside of the image, a higher region."""
 
+STILL = 0.02  # [px] offset below which a boundary lies where the pixels meet
 UNDER = 1.0  # [px] how far an outline goes on under the region above it before it turns
 TAIL = 5  # points at the end of a stretch that tell its direction there
 Outline = list[Polyline | Floats]
@@ -83,6 +84,19 @@ class Stretches:
     def turns(self) -> Bools:
         """Whether a crack has another direction than that before it, shape (crack,)."""
         return self.changes(self.layers.loops.directions[self.cracks])
+
+    @cached_property
+    def is_still(self) -> Bools:
+        """Whether a stretch lies where the pixels meet, shape (stretch,)."""
+        off = np.abs(self.layers.boundary.offsets[self.cracks])
+        return np.asarray(np.maximum.reduceat(off, self.first[:-1]) <= STILL)
+
+    @cached_property
+    def is_exact(self) -> Bools:
+        """Whether it does, and has few corners, shape (stretch,)."""
+        begin = self.first[:-1]
+        turns = np.add.reduceat(self.turns.astype(np.intp), begin) - self.turns[begin]
+        return self.is_still & (turns <= 4 + np.diff(self.first) / 40)
 
     @cached_property
     def middles(self) -> Floats:
@@ -189,17 +203,20 @@ def find_outlines(layers: Layers) -> list[tuple[int, Outline]]:
 def _ring(stretches: Stretches, number: int) -> Polyline | Floats:
     """Return a loop that is all of one kind."""
     points, first = stretches.points
-    if stretches.kind[number] == EDGE:
+    kind = stretches.kind[number]
+    if kind == EDGE or (kind == SEEN and stretches.is_exact[number]):
         return stretches.vertices[number]
     return Polyline(points[first[number] : first[number + 1]], closed=True)
 
 
 def _part(stretches: Stretches, number: int, start: Floats, end: Floats) -> Polyline | Floats:
     """Return a part of a loop that is seen or at the edge of the image."""
+    corners = np.concatenate([start[None], stretches.vertices[number], end[None]])
     if stretches.kind[number] == EDGE:  # the image's corners, and where a hidden stretch ends or begins
         before, after = (stretches.kind[beside[number]] == HIDDEN for beside in stretches.neighbours)
-        corners = np.concatenate([start[None], stretches.vertices[number], end[None]])
         return corners[0 if before else 1 : None if after else -1]
+    if stretches.is_exact[number]:
+        return Polyline(corners, False, is_polygon=True)
     points, first = stretches.points
     return Polyline(points[first[number] : first[number + 1]], False, start, end)
 
