@@ -33,9 +33,6 @@ MOST_STEP = 0.7
 FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
 """First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
 
-BLURRED_STEP = 2.0
-"""By how much blurred gradients are too small."""
-
 ROAM_RATE, LAST_RATE, LEAST_SIZE = 0.15, 0.012, 1e-12
 """Learning rates of free numbers at the beginning and at the end of ``roam`` [px], and the least size of a
 gradient."""
@@ -145,15 +142,12 @@ class OutlineFit:
         self._crossings = Crossings(drawing, self.points)
         self.error, self._around = self._measure.error(self.points)
 
-    def advance(self, run: Run, steps: int, far: int = 0) -> None:
-        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over.
-
-        ``far``: first steps that follow the blurred residual.
-        """
+    def advance(self, run: Run, steps: int) -> None:
+        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over."""
         at, around, idle = self.points, self._around, 0
         damping = np.full(len(self._following), DAMPING)
         for done in range(1, steps + 1):
-            gradient = self._measure.gradient(blurred=done <= far)
+            gradient = self._measure.gradient()
             if self._paints:
                 self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0 and done < steps:
@@ -161,8 +155,6 @@ class OutlineFit:
             freedom = self._constraints.freedom(at)
             bending = Bending(self._measure.samples(at), self._following)
             change = newton_step(bending, freedom, gradient, damping, self._measure.least)
-            if done <= far:
-                change = BLURRED_STEP * change
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at, refused = self._moved(at, change)
             error, now = self._measure.error(at)
@@ -170,7 +162,7 @@ class OutlineFit:
                 (now <= around) & ~refused, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED
             )
             around = now
-            idle = 0 if done <= far or error < (1 - LEAST_GAIN) * self.error else idle + 1
+            idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
                 self.points, self.error, self._around = at, error, now
                 if self._paints:
