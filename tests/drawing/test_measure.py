@@ -12,7 +12,7 @@ from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.measure import pixels_around
 from warpsplat.drawing.model import errors, fitted
-from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -71,11 +71,14 @@ def test_the_normal_equations() -> None:
     made, rng = logo(), np.random.default_rng(1)
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
     samples, following = fit.places(), made.following()
-    bending, points = Bending(samples, following), fit.points
+    points = fit.points
+
+    def gradient_at(points: np.ndarray) -> np.ndarray:
+        return Equations(samples, with_ends(points, following), following).gradient
 
     def error_and_gradient(points: np.ndarray) -> tuple[float, np.ndarray]:
         cubics = with_ends(points, following)
-        return float(errors(samples, cubics).sum()), bending.gradient(cubics)
+        return float(errors(samples, cubics).sum()), gradient_at(points)
 
     gradient = error_and_gradient(points)[1]
     change, h = rng.normal(size=points.size), 1e-4
@@ -83,12 +86,13 @@ def test_the_normal_equations() -> None:
     assert (ends[0][0] - ends[1][0]) / (2 * h) == pytest.approx(gradient @ change, rel=1e-5)
     freedom = Constraints(made).freedom(points)
     damping, least = np.full(len(following), 0.1), 1e-7
-    found = newton_step(bending, freedom, gradient, damping, least)
+    equations = Equations(samples, with_ends(points, following), following)
+    found = newton_step(equations, freedom, gradient, damping, least)
     # The gradient is linear in the points: its differences are the curvature.
     flat = np.zeros_like(points)
     steps = np.eye(points.size).reshape(-1, *points.shape)
-    full = np.stack([bending.gradient(with_ends(step, following)) for step in steps])
-    full -= bending.gradient(with_ends(flat, following))
+    full = np.stack([gradient_at(step) for step in steps])
+    full -= gradient_at(flat)
     own = np.zeros((len(following), 4))
     t, weight = samples.t, 2 * damping[samples.cubic] * samples.weight
     shares = np.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3], axis=1)

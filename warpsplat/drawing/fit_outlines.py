@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, with_ends
 from warpsplat.drawing.crossings import Crossings
 from warpsplat.drawing.measure import Measure, Samples, is_shaded
-from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
@@ -153,8 +153,9 @@ class OutlineFit:
             if done % LOOKS == 0 and done < steps:
                 self._measure.look()
             freedom = self._constraints.freedom(at)
-            bending = Bending(self._measure.samples(at), self._following)
-            change = newton_step(bending, freedom, gradient, damping, self._measure.least)
+            samples = self._measure.samples(at)
+            equations = Equations(samples, with_ends(at, self._following), self._following)
+            change = newton_step(equations, freedom, gradient, damping, self._measure.least)
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at, refused = self._moved(at, change)
             error, now = self._measure.error(at)
