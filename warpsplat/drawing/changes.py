@@ -17,6 +17,9 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.scene.scene import starts_of
 
+MOST_OFF = 0.6
+"""Largest distance of an outline from the one that may take its place [px]."""
+
 Outlines = dict[int, tuple[npt.NDArray[np.floating], npt.NDArray[np.integer]]]
 """Points, shape (point, 2), and joints, shape (point,), by contour."""
 

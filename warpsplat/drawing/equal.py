@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing import prices
-from warpsplat.drawing.changes import changed, contour_change, worthwhile
+from warpsplat.drawing.changes import MOST_OFF, changed, contour_change, worthwhile
 from warpsplat.drawing.constraints import Drawing, Floats, with_ends
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.fit.problem import Run
@@ -17,9 +17,6 @@ from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.svg.primitives import primitives
 from warpsplat.svg.sizes import USE
 from warpsplat.svg.symbols import parts_of, rows_of
-
-MOST_APART = 0.6
-"""Largest difference of two outlines' moments that are likely equal [px]."""
 
 SAMPLES_PER_CUBIC = 8
 
@@ -69,7 +66,7 @@ def _likely(scene: Scene) -> list[Equal]:
     for i in range(len(parts)):
         if not left[i]:
             continue
-        near = left & (counts == counts[i]) & (np.abs(moments - moments[i]).max(axis=1) <= MOST_APART)
+        near = left & (counts == counts[i]) & (np.abs(moments - moments[i]).max(axis=1) <= MOST_OFF)
         index = np.flatnonzero(near)
         left[index] = False
         if len(index) > 1:

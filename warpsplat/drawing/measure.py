@@ -72,13 +72,17 @@ def different(numbers: Links) -> Links:
     return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
 
 
+def chords(cubics: Floats) -> Floats:
+    """Return the lengths of the control polygons, shape (cubic,)."""
+    return np.asarray(np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1))
+
+
 def pixels_around(cubics: Floats, width: int, height: int) -> tuple[Links, Links]:
     """Return pairs of a cubic and a pixel on or beside it, ascending; pixels by rows.
 
     ``cubics``: shape (cubic, 4, 2) [px]; ``width``, ``height``: of the image.
     """
-    reach = np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1)
-    counts = 2 + np.minimum(np.ceil(reach), width + height).astype(np.intp)
+    counts = 2 + np.minimum(np.ceil(chords(cubics)), width + height).astype(np.intp)
     which = np.repeat(np.arange(len(cubics)), counts)
     number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     t = (number + 0.5) / counts[which]

@@ -16,7 +16,7 @@ from warpsplat.drawing.constraints import (
     summed,
     with_ends,
 )
-from warpsplat.drawing.measure import Samples
+from warpsplat.drawing.measure import Samples, chords
 from warpsplat.drawing.nodes import WITHOUT, Edits
 from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.drawing.trace.beziers import points_at
@@ -70,11 +70,6 @@ def _shares(drawing: Drawing, at: Links) -> Floats:
     cubics, before = drawing.cubics(), drawing.neighbours()[0]
     lengths = [chords(cubics[rows]) for rows in (before[at], at)]
     return np.asarray(lengths[0] / np.maximum(lengths[0] + lengths[1], 1e-9))
-
-
-def chords(cubics: Floats) -> Floats:
-    """Return the lengths of the control polygons."""
-    return np.asarray(np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1))
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing import prices
-from warpsplat.drawing.changes import Change, contour_change
+from warpsplat.drawing.changes import MOST_OFF, Change, contour_change
 from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, Floats, summed
 from warpsplat.drawing.measure import Samples
 from warpsplat.drawing.trace.contours import joints_of
@@ -24,16 +24,13 @@ from warpsplat.svg.primitives import Primitive
 SAMPLES = 96
 """Places by which an outline is compared with a shape."""
 
-MOST_OFF = 0.6
-"""Largest distance of an outline from its basic shape, and what counts as one where another hides it [px]."""
-
 LEAST_NEAR = 0.6
 """Least share of an outline that is near its basic shape: what other shapes hide may be anywhere."""
 
 ROUNDS = 8  # of Gauss and Newton's method
-STEP = 1e-4  # [px] of numeric derivatives
-DAMPING = 1e-6  # of the squared derivatives, where an outline leaves a parameter open
-LEAST_SIZE = 0.25  # [px] half a side, or a radius, at the least
+SMALL = 1e-4
+"""Steps of numeric derivatives, least sizes [px], and added curvature, as a share, where an outline leaves a
+size open."""
 
 Boxes = Callable[[Floats], tuple[Floats, Floats]]
 
@@ -60,17 +57,21 @@ class Family:
         return Primitive((x - a, y - b), (x + a, y + b), (rx, ry), is_clockwise)
 
 
+def _box(sizes: Floats) -> tuple[Floats, Floats]:
+    return sizes, np.zeros_like(sizes)
+
+
+def _ellipse(sizes: Floats) -> tuple[Floats, Floats]:
+    half = np.broadcast_to(sizes, (len(sizes), 2))
+    return half, half
+
+
 def _rounded(sizes: Floats) -> tuple[Floats, Floats]:
     half = sizes[:, :2]
     return half, np.repeat(np.minimum(sizes[:, 2:], half.min(axis=1, keepdims=True)), 2, axis=1)
 
 
-FAMILIES = (
-    Family(2, lambda sizes: (sizes, np.zeros_like(sizes))),
-    Family(1, lambda sizes: (np.repeat(sizes, 2, axis=1),) * 2),
-    Family(2, lambda sizes: (sizes, sizes)),
-    Family(3, _rounded),
-)
+FAMILIES = Family(2, _box), Family(1, _ellipse), Family(2, _ellipse), Family(3, _rounded)
 """Rectangles, circles, ellipses, and rectangles with round corners, by their bytes."""
 
 
@@ -136,7 +137,7 @@ def distances(points: Floats, half: Floats, radii: Floats) -> Floats:
         half: Half the sides, shape (outline, 2).
         radii: Shape (outline, 2).
     """
-    beyond, radius = np.abs(points) - half[:, None], np.maximum(radii, STEP)[:, None]
+    beyond, radius = np.abs(points) - half[:, None], np.maximum(radii, SMALL)[:, None]
     from_center = np.maximum(beyond + radius, 0) / radius
     level = hypot(from_center[..., 0], from_center[..., 1])
     slopes = from_center / radius
@@ -153,7 +154,7 @@ def nearest(family: Family, places: Floats, weights: Floats) -> tuple[Floats, Fl
         Centres and sizes, shape (outline, 2 + size), and distances, shape (outline, sample) [px].
     """
     low, high = places.min(axis=1), places.max(axis=1)
-    center, half = (low + high) / 2, np.maximum((high - low) / 2, LEAST_SIZE)
+    center, half = (low + high) / 2, np.maximum((high - low) / 2, SMALL)
     least = half.min(axis=1, keepdims=True)
     sizes = np.concatenate([half, 0.5 * least], axis=1) if family.count > 1 else half.mean(1, keepdims=True)
     values = np.concatenate([center, sizes], axis=1)[:, : 2 + family.count]
@@ -165,11 +166,11 @@ def nearest(family: Family, places: Floats, weights: Floats) -> tuple[Floats, Fl
     for number in range(ROUNDS):
         reach = np.maximum(size / (2 << number), 1)
         here = off(values)
-        slopes = np.stack([(off(values + STEP * axis) - here) / STEP for axis in unit])
+        slopes = np.stack([(off(values + SMALL * axis) - here) / SMALL for axis in unit])
         weighted = slopes * weights / (1 + (here / reach[:, None]) ** 2) ** 2
         system = np.stack([(weighted * slope).sum(axis=2) for slope in slopes]).transpose(2, 0, 1)
         stiffness = np.diagonal(system, axis1=1, axis2=2)
-        damped = system + (DAMPING * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
+        damped = system + (SMALL * stiffness.sum(axis=1) + 1e-12)[:, None, None] * unit
         values = values - solve(damped, (weighted * here).sum(axis=2).T[..., None])[..., 0]
-        values[:, 2:] = np.maximum(values[:, 2:], LEAST_SIZE)
+        values[:, 2:] = np.maximum(values[:, 2:], SMALL)
     return values, np.abs(off(values))
