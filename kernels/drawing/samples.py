@@ -3,11 +3,9 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.drawing.cubic import nearest_at, point_at, polynomial, slope_at
+from warpsplat.kernels.drawing.cubic import TINY, nearest_at, point_at, polynomial, slope_at
 
 wp.set_module_options(constants.MODULE_OPTIONS)
-
-LEAST_SPEED = wp.constant(wp.float64(1.0e-9))
 
 
 @wp.kernel
@@ -30,7 +28,7 @@ def along(
         ahead = slope_at(f, t[s])
         speed = wp.length(ahead)
         place[s] = point_at(f, t[s])
-        across[s] = wp.vec2d(-ahead[1], ahead[0]) / wp.max(speed, LEAST_SPEED)
+        across[s] = wp.vec2d(-ahead[1], ahead[0]) / wp.max(speed, TINY)
         weight[s] = share[s] * speed
 
 

@@ -24,7 +24,7 @@ from warpsplat.kernels.drawing import samples as kernels
 from warpsplat.rendering.program import launch_on_host
 from warpsplat.scene.scene import ranges
 
-STEPS, PLACING_ROUNDS = 2, 2
+STEPS = 2
 """Steps of a fit, and of finding where on its piece a sample lies before each."""
 
 DAMPING = 0.01
@@ -34,7 +34,7 @@ DAMPING = 0.01
 def placed(samples: Samples, cubics: Floats) -> Samples:
     """Return samples at the places of ``cubics``, shape (cubic, 4, 2), that are nearest to theirs."""
     t, count = samples.t.copy(), len(cubics)
-    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "rounds": PLACING_ROUNDS}
+    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "rounds": STEPS}
     launch_on_host(kernels.nearest, count, samples, values, t=t)
     return replace(samples, t=t)
 

@@ -12,9 +12,6 @@ from warpsplat.rendering.program import launch_on_host
 ITERATIONS, CONVERGED = 60, 1e-4
 """Most steps of conjugate gradients, and the square of the residual, over the first, at which they end."""
 
-PAIRS = 30
-"""Numbers of the second derivatives by pairs of a cubic's control points."""
-
 
 class Equations:
     """The derivatives of the error of outlines: the second by cubics, the first by coordinates."""
@@ -22,7 +19,7 @@ class Equations:
     def __init__(self, samples: Samples, cubics: Floats, following: Links) -> None:
         """``cubics``: shape (cubic, 4, 2); ``following``: as ``Drawing.following``."""
         self.following, count = following, len(following)
-        self.blocks, by_corner = np.zeros((count, PAIRS)), np.zeros((count, 8))
+        self.blocks, by_corner = np.zeros((count, 30)), np.zeros((count, 8))
         values = {"cubics": rows_of(cubics), "first": samples.starts(count), "gradient": by_corner}
         launch_on_host(newton.derivatives, count, samples, values, blocks=self.blocks)
         by_corner[following, :2] += by_corner[:, 6:]  # each cubic follows one other

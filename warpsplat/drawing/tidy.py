@@ -30,7 +30,7 @@ FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
 FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
-"""Steps of Adam after the first two fits, where they are needed, and pixels that all of these may render."""
+"""Steps by signs after the first two fits, where they are needed, and pixels that all of these may render."""
 
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
@@ -181,11 +181,10 @@ def touched(contours: Links, count: int) -> Flags:
 def drawing_grid(fit: OutlineFit, finest: float, byte_of: Worth) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
-    before = model.errors(samples, fit.drawing.cubics()).sum()
     byte = byte_of(fit.error, estimated_size(scene, DRAFT_GRID))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
-        loss = float(model.errors(samples, low.cubics()).sum() - before)
-        costs[grid] = loss + byte * estimated_size(scene, grid)
+        error = float(model.errors(samples, low.cubics()).sum())
+        costs[grid] = error + byte * estimated_size(scene, grid)
     return min(costs, key=costs.__getitem__)
