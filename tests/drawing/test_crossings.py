@@ -57,6 +57,6 @@ def test_fits_of_noise_do_not_cross(seed: int) -> None:
     made = Drawing(traced.scene, traced.joints)
     at_first, run = sum(crosses(made)), Run(Backend.on("cpu"))
     fit = OutlineFit(image, made, run)
-    fit.advance(run, 16)
+    fit.advance(run, 16, 4)
     fit.roam(run, 40)
     assert sum(crosses(fit.drawing)) <= at_first

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import BLUE, RED, WHITE, disc, drawing, logo, outline, seam
+from tests.drawing.drawings import BLUE, RED, WHITE, disc, drawing, logo, outline, polygon, seam
 from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing
@@ -154,6 +154,21 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
     same = np.stack(still[1]) == constants.CACHED
     assert same[1:].any(axis=1).all(), "where nothing is to be found"
     assert (same[1:-1] != same[2:]).any(), "outlines come and go"
+
+
+def test_level_edges_pass_small_minima(device: str) -> None:
+    """The row and the column beside an edge have a trace of its colour, as JPEG leaves it."""
+    backend = Backend.on(device)
+
+    def box(low: float) -> Drawing:
+        corners = polygon((low, low), (48 - low, low), (48 - low, 48 - low), (low, 48 - low))
+        return drawing(Canvas(48, 48, WHITE), (BLUE, [corners]))
+
+    target = render(box(10.3).scene, backend=backend)
+    target[9:39, 9:39][[0, -1]] = target[9:39, 9:39][:, [0, -1]] = 0.9 + 0.1 * np.array(BLUE)
+    fit = OutlineFit(target, box(9.6), Run(backend))
+    fit.advance(Run(backend), 12, far=4)
+    np.testing.assert_allclose(fit.points[::3], box(10.3).scene.points[::3], atol=0.05)
 
 
 def test_handles_follow_held_points(device: str) -> None:

@@ -148,12 +148,15 @@ class OutlineFit:
         self._crossings = Crossings(drawing, self.points)
         self.error, self._around = self._measure.error(self.points)
 
-    def advance(self, run: Run, steps: int) -> None:
-        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over."""
+    def advance(self, run: Run, steps: int, far: int = 0) -> None:
+        """Make at most so many ``steps``, each with a render; fewer when ``run`` is over.
+
+        ``far``: first steps that follow the blurred residual.
+        """
         at, around, idle = self.points, self._around, 0
         damping = np.full(len(self._following), CALMER * RAISED)
         for done in range(1, steps + 1):
-            gradient = self._measure.gradient()
+            gradient = self._measure.gradient(blurred=done <= far)
             if self._paints:
                 self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0 and done < steps:
@@ -162,6 +165,8 @@ class OutlineFit:
             samples = self._measure.samples(at)
             equations = Equations(samples, with_ends(at, self._following), self._following)
             change = newton_step(equations, freedom, gradient, damping, self._measure.least)
+            if done <= far:
+                change = 2 * change  # blurred gradients are too small
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             moved = self._constraints.project(at + change.reshape(-1, 2))
             at, refused = self._crossings.refuse(at, moved, self._constraints)
@@ -170,7 +175,7 @@ class OutlineFit:
                 (now <= around) & ~refused, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED
             )
             around = now
-            idle = 0 if error < (1 - LEAST_GAIN) * self.error else idle + 1
+            idle = 0 if done <= far or error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
                 self.points, self.error, self._around = at, error, now
                 if self._paints:

@@ -23,7 +23,7 @@ from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import launch_on_host
 from warpsplat.rendering.renderer import Capacity, Renderer
-from warpsplat.rendering.tiles import TILE, read_tiles, to_tiles, write_tiles
+from warpsplat.rendering.tiles import TILE, from_tiles, read_tiles, to_tiles, write_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, Scene
 
 GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
@@ -113,7 +113,7 @@ class Measure:
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
         self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
-        self._scale = 1 / (3 * viewport.pixel_count)
+        self._size, self._scale = (viewport.width, viewport.height), 1 / (3 * viewport.pixel_count)
         self.least = LEAST_CONTRAST * self._scale
         """Curvature that does not count."""
         self._target = to_tiles(target)
@@ -150,9 +150,19 @@ class Measure:
         around = summed(self._cubic, parts.ravel()[self._pixel], len(self._following))
         return float(parts.sum(dtype=np.float64)) * self._scale, around * self._scale
 
-    def gradient(self) -> Floats:
-        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,)."""
-        self._back(self._by_image(self._residual))
+    def gradient(self, *, blurred: bool = False) -> Floats:
+        """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,).
+
+        ``blurred``: of the residual. An outline on the border of two pixels may already suit the one that it
+        comes from, and the error itself says nothing of the other one before it is there.
+        """
+        residual = self._residual
+        if blurred:
+            image = np.pad(from_tiles(residual, *self._size), ((1, 1), (1, 1), (0, 0)))
+            rows = image[:-2] + 2 * image[1:-1] + image[2:]
+            image = (rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:]) / 16
+            residual = to_tiles(image)
+        self._back(self._by_image(residual))
         return self._parameters.arrays["points_grad"].numpy().astype(np.float64).ravel()
 
     def look(self) -> None:

@@ -32,6 +32,9 @@ FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
 """Steps by signs after the first two fits, where they are needed, and pixels that all of these may render."""
 
+FAR = 4
+"""Steps at the beginning of the first two that look farther than to the next pixel's border."""
+
 DRAFT_GRID = 10.0
 """View box units per pixel until the grid is chosen."""
 
@@ -86,11 +89,11 @@ def finish_drawing(
     byte = partial(worth, price=price, negligible=negligible)
     parts = [run.part(i / 3, (i + 1) / 3) for i in range(3)]
     fit = OutlineFit(target, drawing, run)
-    fit.advance(parts[0], FIRST_STEPS)
+    fit.advance(parts[0], FIRST_STEPS, FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, byte, run.over), run, fit.capacity)
-        fit.advance(parts[1], SECOND_STEPS)
+        fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
     equal: list[Equal] = []
     if tidy and not run.over():
