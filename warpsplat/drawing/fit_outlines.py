@@ -14,6 +14,7 @@ from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
+from warpsplat.portable import elementary
 from warpsplat.rendering.renderer import Capacity, render
 from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 
@@ -27,9 +28,12 @@ where one did, and its least."""
 MOST_STEP = 0.7
 """How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
-SIGN_STEP, FASTER, SLOWER = 0.15, 1.2, 0.5
-"""First step of numbers that follow the signs of their derivatives [px], and its factors where a sign stays
-and where it changes."""
+FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
+"""First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
+
+ROAM_RATE, LAST_RATE, LEAST_SIZE = 0.15, 0.012, 1e-12
+"""Learning rates of free numbers at the beginning and at the end of ``roam`` [px], and the least size of a
+gradient."""
 
 ROAM_GAIN = 0.02
 """Least share of the error that half of the steps of ``roam`` take away for the others to follow."""
@@ -38,28 +42,13 @@ LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
 
 
-class Signs:
-    """Steps by the signs of derivatives, whatever their sizes (Rprop, Riedmiller and Braun 1993)."""
-
-    def __init__(self, shape: tuple[int, ...], most: float = np.inf) -> None:
-        """Begin with equal steps of all numbers; ``most``: the largest."""
-        self._last, self._step, self._most = np.zeros(shape), np.full(shape, SIGN_STEP), most
-
-    def change(self, gradient: Floats) -> Floats:
-        """Return the next change of the numbers."""
-        agrees, self._last = gradient * self._last, gradient
-        factor = np.where(agrees > 0, FASTER, np.where(agrees < 0, SLOWER, 1.0))
-        self._step = np.minimum(factor * self._step, self._most)
-        return np.asarray(-np.sign(gradient) * self._step)
-
-
 class Paints:
-    """Fits the places of gradients."""
+    """Fits the places of gradients by the signs of derivatives (Rprop, Riedmiller and Braun 1993)."""
 
     def __init__(self, scene: Scene) -> None:
-        """Begin with those of a scene."""
         self.best = scene.frames.astype(np.float64)
-        self._frames, self._signs = self.best.copy(), Signs(self.best.shape)
+        self._frames, self._last = self.best.copy(), np.zeros_like(self.best)
+        self._step = np.full_like(self.best, FRAME_STEP)
         along, across = self.best[:, 2:4], self.best[:, 4:]
         self._round = (scene.paint == Paint.RADIAL) & (across == turned(along)).all(axis=1)
 
@@ -69,7 +58,10 @@ class Paints:
         # Of a circle the second axis follows the first.
         gradient[self._round, 2:4] -= turned(gradient[self._round, 4:])
         gradient[self._round, 4:] = 0
-        self._frames = self._frames + self._signs.change(gradient)
+        agrees = gradient * self._last
+        self._step *= np.where(agrees > 0, FASTER, np.where(agrees < 0, SLOWER, 1.0))
+        self._last = gradient
+        self._frames = self._frames - np.sign(gradient) * self._step
         self._frames[self._round, 4:] = turned(self._frames[self._round, 2:4])
         return self._frames
 
@@ -168,8 +160,7 @@ class OutlineFit:
             if done <= far:
                 change = 2 * change  # blurred gradients are too small
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
-            moved = self._constraints.project(at + change.reshape(-1, 2))
-            at, refused = self._crossings.refuse(at, moved, self._constraints)
+            at, refused = self._moved(at, change)
             error, now = self._measure.error(at)
             damping = np.where(
                 (now <= around) & ~refused, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED
@@ -188,16 +179,21 @@ class OutlineFit:
             self._measure.paint(self._paints.best)
 
     def roam(self, run: Run, steps: int) -> None:
-        """Make so many ``steps`` by signs, half of them where these gain nothing.
+        """Make so many steps of Adam (Kingma and Ba 2015), half of them where these gain nothing.
 
         Where edges are less than a pixel apart, the model of single edges leads to poor minima; steps of one
         length for all, whatever their gradients, lead out of them.
         """
-        at, checked, least = self.points, self.points, (1 - ROAM_GAIN) * self.error
-        signs = Signs((2 * len(at),), MOST_STEP)
+        start, at, mean, square = (1 - ROAM_GAIN) * self.error, self.points, np.zeros(1), np.zeros(1)
+        rate, first, second, checked = ROAM_RATE, 1.0, 1.0, self.points
+        slower = float(elementary.power(LAST_RATE / ROAM_RATE, 1 / max(steps, 1)))
         for done in range(1, steps + 1):
+            rate, first, second = rate * slower, 0.9 * first, 0.999 * second
             freedom = self._constraints.freedom(at)
-            change = signs.change(freedom.adjoint(self._measure.gradient()))
+            gradient = freedom.adjoint(self._measure.gradient())
+            mean, square = 0.9 * mean + 0.1 * gradient, 0.999 * square + 0.001 * gradient * gradient
+            size = np.sqrt(square / (1 - second)) + LEAST_SIZE
+            change = -rate * mean / (1 - first) / size
             at = self._constraints.project(at + freedom.times(change).reshape(-1, 2))
             is_checked = done % LOOKS == 0 or done == steps
             if is_checked:
@@ -206,10 +202,15 @@ class OutlineFit:
             error, around = self._measure.error(at)
             if is_checked and error < self.error:
                 self.points, self.error, self._around = at, error, around
-            if run.over() or (done == steps // 2 and self.error > least):
+            if run.over() or (done == steps // 2 and self.error > start):
                 break
         self._measure.error(self.points)
         self._measure.look()
+
+    def _moved(self, points: Floats, change: Floats) -> tuple[Floats, Flags]:
+        """Return points after a step, and the cubics that it leaves where they were."""
+        moved = self._constraints.project(points + change.reshape(-1, 2))
+        return self._crossings.refuse(points, moved, self._constraints)
 
     def _progress(self, done: int, steps: int, seconds: float) -> Progress:
         scene = self._scene()

@@ -30,7 +30,7 @@ FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 """Renders of the fits before and after nodes are removed, and after rounding."""
 
 FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
-"""Steps by signs after the first two fits, where they are needed, and pixels that all of these may render."""
+"""Steps of Adam after the first two fits, where they are needed, and pixels that all of these may render."""
 
 FAR = 4
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
