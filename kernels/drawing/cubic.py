@@ -13,7 +13,7 @@ ONE = wp.constant(wp.float64(1.0))
 TWO = wp.constant(wp.float64(2.0))
 THREE = wp.constant(wp.float64(3.0))
 SIX = wp.constant(wp.float64(6.0))
-LEAST_BEND = wp.constant(wp.float64(1.0e-12))
+TINY = wp.constant(wp.float64(1.0e-12))
 
 corners: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float64)
 """The control points, or the coefficients of the polynomial, lowest first."""
@@ -59,5 +59,5 @@ def nearest_at(f: corners, place: wp.vec2d, start: wp.float64, rounds: wp.int32)
         speed = slope_at(f, t)
         bend = wp.vec2d(SIX * f[3, 0] * t + TWO * f[2, 0], SIX * f[3, 1] * t + TWO * f[2, 1])
         second = wp.dot(speed, speed) + wp.max(wp.dot(away, bend), ZERO)
-        t = wp.clamp(t - wp.dot(away, speed) / wp.max(second, LEAST_BEND), ZERO, ONE)
+        t = wp.clamp(t - wp.dot(away, speed) / wp.max(second, TINY), ZERO, ONE)
     return t

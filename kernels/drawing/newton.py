@@ -27,36 +27,7 @@ def bernstein(k: wp.int32, t: wp.float64) -> wp.float64:
 
 
 @wp.kernel
-def curvature(
-    # In:
-    offset: wp.int32,
-    first: wp.array[wp.int64],  # [cubic + 1]
-    t: wp.array[wp.float64],  # [sample]
-    across: wp.array[wp.vec2d],  # [sample]
-    weight: wp.array[wp.float64],  # [sample]
-    # Out:
-    blocks: wp.array2d[wp.float64],  # [cubic, 30] updated: xx, xy, yy for each pair of control points
-):
-    """Sum the second derivatives of the samples' errors by the control points. One thread a cubic."""
-    i = offset + wp.tid()
-    for s in range(int(first[i]), int(first[i + 1])):
-        w = TWO * weight[s]
-        u = across[s]
-        xx = w * u[0] * u[0]
-        xy = w * u[0] * u[1]
-        yy = w * u[1] * u[1]
-        n = int(0)
-        for j in range(4):
-            for k in range(j, 4):
-                share = bernstein(j, t[s]) * bernstein(k, t[s])
-                blocks[i, n] = blocks[i, n] + share * xx
-                blocks[i, n + 1] = blocks[i, n + 1] + share * xy
-                blocks[i, n + 2] = blocks[i, n + 2] + share * yy
-                n += 3
-
-
-@wp.kernel
-def slopes(
+def derivatives(
     # In:
     offset: wp.int32,
     cubics: wp.array[wp.vec2d],  # [4 x cubic] [px]
@@ -67,17 +38,26 @@ def slopes(
     weight: wp.array[wp.float64],  # [sample]
     # Out:
     gradient: wp.array2d[wp.float64],  # [cubic, 8] updated
+    blocks: wp.array2d[wp.float64],  # [cubic, 30] updated: xx, xy, yy for each pair of control points
 ):
-    """Sum the first derivatives of the samples' errors by the control points. One thread a cubic."""
+    """Sum the derivatives of the samples' errors by the control points. One thread a cubic."""
     i = offset + wp.tid()
     f = polynomial(cubics, i)
     for s in range(int(first[i]), int(first[i + 1])):
+        w = TWO * weight[s]
         u = across[s]
-        force = TWO * weight[s] * wp.dot(point_at(f, t[s]) - place[s], u)
-        for k in range(4):
-            part = force * bernstein(k, t[s])
-            gradient[i, 2 * k] = gradient[i, 2 * k] + part * u[0]
-            gradient[i, 2 * k + 1] = gradient[i, 2 * k + 1] + part * u[1]
+        force = w * wp.dot(point_at(f, t[s]) - place[s], u)
+        n = int(0)
+        for j in range(4):
+            share = bernstein(j, t[s])
+            gradient[i, 2 * j] = gradient[i, 2 * j] + share * force * u[0]
+            gradient[i, 2 * j + 1] = gradient[i, 2 * j + 1] + share * force * u[1]
+            for k in range(j, 4):
+                both = share * bernstein(k, t[s]) * w
+                blocks[i, n] = blocks[i, n] + both * u[0] * u[0]
+                blocks[i, n + 1] = blocks[i, n + 1] + both * u[0] * u[1]
+                blocks[i, n + 2] = blocks[i, n + 2] + both * u[1] * u[1]
+                n += 3
 
 
 @wp.func
@@ -131,7 +111,7 @@ def solve(
     column: wp.array[wp.int64],  # [entry] free number
     value: wp.array[wp.float64],  # [entry]
     following: wp.array[wp.int64],  # [cubic]
-    blocks: wp.array2d[wp.float64],  # [cubic, 30] as ``curvature`` gives them
+    blocks: wp.array2d[wp.float64],  # [cubic, 30] as ``derivatives`` gives them
     gradient: wp.array[wp.float64],  # [6 x cubic] by the coordinates
     damping: wp.array[wp.float64],  # [cubic] added curvature, as a share
     least: wp.float64,  # added curvature

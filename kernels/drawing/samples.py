@@ -1,13 +1,11 @@
-"""Where samples lie on cubics, and how far off."""
+"""Where samples lie on cubics."""
 
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.drawing.cubic import ZERO, nearest_at, point_at, polynomial, slope_at
+from warpsplat.kernels.drawing.cubic import TINY, nearest_at, point_at, polynomial, slope_at
 
 wp.set_module_options(constants.MODULE_OPTIONS)
-
-LEAST_SPEED = wp.constant(wp.float64(1.0e-9))
 
 
 @wp.kernel
@@ -30,7 +28,7 @@ def along(
         ahead = slope_at(f, t[s])
         speed = wp.length(ahead)
         place[s] = point_at(f, t[s])
-        across[s] = wp.vec2d(-ahead[1], ahead[0]) / wp.max(speed, LEAST_SPEED)
+        across[s] = wp.vec2d(-ahead[1], ahead[0]) / wp.max(speed, TINY)
         weight[s] = share[s] * speed
 
 
@@ -50,33 +48,3 @@ def nearest(
     f = polynomial(cubics, i)
     for s in range(int(first[i]), int(first[i + 1])):
         t[s] = nearest_at(f, place[s], t[s], rounds)
-
-
-@wp.kernel
-def errors(
-    # In:
-    offset: wp.int32,
-    cubics: wp.array[wp.vec2d],  # [4 x n] in place of others [px]
-    instead: wp.array[wp.int64],  # [n] the cubic whose samples are taken
-    low: wp.array[wp.float64],  # [n] where on the new cubic the old one would begin
-    high: wp.array[wp.float64],  # [n] and end
-    first: wp.array[wp.int64],  # [cubic + 1]
-    t: wp.array[wp.float64],  # [sample]
-    place: wp.array[wp.vec2d],  # [sample] [px]
-    across: wp.array[wp.vec2d],  # [sample]
-    weight: wp.array[wp.float64],  # [sample]
-    rounds: wp.int32,
-    # Out:
-    error: wp.array[wp.float64],  # [n]
-):
-    """Sum the errors of samples on cubics that take the places of theirs. One thread a cubic."""
-    i = offset + wp.tid()
-    f = polynomial(cubics, i)
-    old = int(instead[i])
-    total = ZERO
-    for s in range(int(first[old]), int(first[old + 1])):
-        start = low[i] + (high[i] - low[i]) * t[s]
-        there = nearest_at(f, place[s], start, rounds)
-        off = wp.dot(point_at(f, there) - place[s], across[s])
-        total += weight[s] * off * off
-    error[i] = total

@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, disc, drawing, logo, polygon
-from warpsplat.alpha import squares
+from tests.drawing.drawings import BLUE, GOLD, WHITE, disc, drawing, logo, polygon
 from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
-from warpsplat.drawing.measure import Surroundings
+from warpsplat.drawing.measure import pixels_around
 from warpsplat.drawing.model import errors, fitted
-from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
-from warpsplat.rendering.backend import Backend, Viewport
+from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray
 
@@ -67,28 +66,19 @@ def test_the_gradient_is_that_of_the_render(device: str) -> None:
         assert (ends[0] - ends[1]) / 4e-3 == pytest.approx(gradient @ way, rel=0.05, abs=2e-6)
 
 
-def test_the_error_counts_far_tiles(device: str) -> None:
-    """Those without outlines are compared once."""
-    backend = Backend.on(device, 1)
-    made = drawing(Canvas(96, 80, WHITE), (RED, [disc(20, 20, 8)]))
-    target = render(made.scene, backend=backend)
-    target[60:70, 70:90] = 0
-    fit = OutlineFit(target, made, Run(backend))
-    assert fit.error == pytest.approx(
-        squares(render(made.scene, backend=backend) - target).mean() / 3, rel=1e-5
-    )
-
-
 def test_the_normal_equations() -> None:
     """Against dense ones in float64."""
     made, rng = logo(), np.random.default_rng(1)
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
     samples, following = fit.places(), made.following()
-    bending, points = Bending(samples, following), fit.points
+    points = fit.points
+
+    def gradient_at(points: np.ndarray) -> np.ndarray:
+        return Equations(samples, with_ends(points, following), following).gradient
 
     def error_and_gradient(points: np.ndarray) -> tuple[float, np.ndarray]:
         cubics = with_ends(points, following)
-        return float(errors(samples, cubics).sum()), bending.gradient(cubics)
+        return float(errors(samples, cubics).sum()), gradient_at(points)
 
     gradient = error_and_gradient(points)[1]
     change, h = rng.normal(size=points.size), 1e-4
@@ -96,12 +86,13 @@ def test_the_normal_equations() -> None:
     assert (ends[0][0] - ends[1][0]) / (2 * h) == pytest.approx(gradient @ change, rel=1e-5)
     freedom = Constraints(made).freedom(points)
     damping, least = np.full(len(following), 0.1), 1e-7
-    found = newton_step(bending, freedom, gradient, damping, least)
+    equations = Equations(samples, with_ends(points, following), following)
+    found = newton_step(equations, freedom, gradient, damping, least)
     # The gradient is linear in the points: its differences are the curvature.
     flat = np.zeros_like(points)
     steps = np.eye(points.size).reshape(-1, *points.shape)
-    full = np.stack([bending.gradient(with_ends(step, following)) for step in steps])
-    full -= bending.gradient(with_ends(flat, following))
+    full = np.stack([gradient_at(step) for step in steps])
+    full -= gradient_at(flat)
     own = np.zeros((len(following), 4))
     t, weight = samples.t, 2 * damping[samples.cubic] * samples.weight
     shares = np.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3], axis=1)
@@ -132,6 +123,6 @@ def test_outlines_follow_their_places() -> None:
 def test_each_cubic_has_the_pixels_around_it() -> None:
     """A level line of 20 px with a pixel on each side, cut off at the border of the image."""
     line = np.array([[(10, 20.5), (16, 20.5), (23, 20.5), (30, 20.5)], [(60, 20.5)] * 4], float)
-    near = Surroundings(line, Viewport(64, 48))
-    tiles = np.ones((len(near.tiles), 16, 16), np.float32)
-    assert near.sums(tiles).tolist() == [3 * 22, 9]
+    cubic, pixel = pixels_around(line, 64, 48)
+    assert np.bincount(cubic).tolist() == [3 * 22, 9]
+    assert sorted(set((pixel[cubic == 0] // 64).tolist())) == [19, 20, 21]

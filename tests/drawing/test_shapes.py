@@ -19,7 +19,8 @@ from tests.drawing.drawings import (
     star,
 )
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.shapes import merge_near
+from warpsplat.drawing.line_art import with_near_merged
+from warpsplat.drawing.shapes import FAMILIES, Family, distances, nearest
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
@@ -75,10 +76,38 @@ def test_what_an_image_shows_otherwise_stays() -> None:
     assert not found(drawing(CANVAS, (RED, [flat(20, 20, 14)]), (BLUE, [cut])))
 
 
+VALUES = [30, 20, 12, 8], [30, 20, 9], [30, 20, 12, 6], [30, 20, 12, 8, 3]
+
+
+@pytest.mark.parametrize(("family", "wanted"), list(zip(FAMILIES, VALUES, strict=True)))
+def test_the_nearest_shape_is_the_one_that_it_was(family: Family, wanted: list[float]) -> None:
+    """A tenth of the points may be anywhere: another shape may hide what is there."""
+    made = family.shape(np.array(wanted, float))
+    low, high, radii = np.array(made.low), np.array(made.high), np.array(made.radii)
+    angle = np.linspace(0, 2 * np.pi, 96, endpoint=False)
+    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if radii[0]:
+        points = (low + high) / 2 + np.sign(way) * ((high - low) / 2 - radii) + radii * way
+    else:
+        points = (low + high) / 2 + (high - low) / 2 * way / np.abs(way).max(axis=1, keepdims=True)
+    points[:9] += (0, 3)
+    values, off = nearest(family, points[None], np.ones((1, 96)))
+    np.testing.assert_allclose(values[0], wanted, atol=0.15)
+    assert off[0, 9:].max() < 0.2
+
+
+def test_distances_have_signs() -> None:
+    """From a box with round corners, an ellipse, and a box with sharp ones."""
+    half = np.array([[12.0, 8], [12, 8], [12, 8]])
+    radii = np.array([[3.0, 3], [12, 8], [0, 0]])
+    points = np.array([[(13.0, 0), (0, -9), (9, 6), (11, 0)]] * 3)
+    wanted = [[1, 1, -2, -1], [1, 1, 0.57, -1.04], [1, 1, -2, -1]]
+    np.testing.assert_allclose(distances(points, half, radii), wanted, atol=0.1)
+
+
 def test_near_values_are_merged_by_their_weights() -> None:
-    values, counts = merge_near(np.array([3.0, 1.0, 1.2, 9.0]), np.array([1.0, 3.0, 1.0, 1.0]), 0.1)
+    values = with_near_merged(np.array([3.0, 1.0, 1.2, 9.0]), np.array([1.0, 3.0, 1.0, 1.0]), 0.1)
     np.testing.assert_allclose(values, [3, 1.05, 1.05, 9])
-    assert counts.tolist() == [1, 2, 2, 1]
 
 
 def test_equal_outlines_of_a_noisy_image_are_equal() -> None:

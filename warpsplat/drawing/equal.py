@@ -2,77 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing import prices
-from warpsplat.drawing.cells import Cells, cells_around, joined, sum_within
-from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.shapes import Errors, cubics_of, with_contours
+from warpsplat.drawing.changes import MOST_OFF, changed, contour_change, worthwhile
+from warpsplat.drawing.constraints import Drawing, Floats, with_ends
 from warpsplat.drawing.trace.beziers import points_at
+from warpsplat.fit.problem import Run
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene import IndexArray, Scene
+from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.svg.primitives import primitives
 from warpsplat.svg.sizes import USE
 from warpsplat.svg.symbols import parts_of, rows_of
 
-Floats = npt.NDArray[np.float64]
-
-MOST_APART = 0.6
-"""Largest difference of two outlines' moments that are likely equal [px]."""
-
 SAMPLES_PER_CUBIC = 8
-
-Refit = Callable[[Drawing], Drawing]
-"""Fits the outlines of a drawing for some steps."""
-
 
 Equal = list[IndexArray]
 """Indices of the contours of each of some equal outlines, in corresponding order."""
 
 
 def with_equal_outlines(
-    drawing: Drawing, errors_of: Errors, errors: Floats, worth: float, refit: Refit
+    target: FloatArray, drawing: Drawing, run: Run, worth: float
 ) -> tuple[Drawing, list[Equal]]:
     """Return a drawing in which outlines are equal where that costs less error than their bytes are worth.
 
-    All that are likely equal get the nodes of one of them, are fitted, and then take their mean.
-
-    Args:
-        drawing: Fitted.
-        errors_of: The judge of drawings.
-        errors: Those of the drawing.
-        worth: Mean squared error that a byte is worth.
-        refit: The fit.
+    Arguments are those of ``worthwhile``.
     """
-    groups = _likely(drawing.scene)
-    cells = {int(part[0]): _cells(drawing.scene, part) for group in groups for part in group}
-    saved = {
-        int(part[0]): prices.CUBIC * len(rows_of(drawing.scene, part)) / 3 - USE
-        for group in groups
-        for part in group
-    }
-    while groups:
-        made = _averaged(refit(_with_nodes_of_one(drawing, groups)), groups)
-        growth = errors_of(made) - errors
-        kept = []
-        for group in groups:
-            near = [p for p in group if sum_within(growth, cells[int(p[0])]) <= saved[int(p[0])] * worth]
-            kept.append(near)
-        if all(len(a) == len(b) for a, b in zip(kept, groups, strict=True)):
-            return made, groups
-        groups = [group for group in kept if len(group) > 1]
-    return drawing, []
+    scene, groups, changes = drawing.scene, _likely(drawing.scene), []
+    for model, *others in groups:
+        center = _moments(scene, model)[0]
+        rows = [slice(*scene.starts[contour : contour + 2].tolist()) for contour in model.tolist()]
+        for part in others:
+            shift = _moments(scene, part)[0] - center
+            made = [(scene.points[own] + shift, drawing.joints[own]) for own in rows]
+            changes.append(
+                contour_change(drawing, dict(zip(part.tolist(), made, strict=True)), _saved(scene, model))
+            )
+    taken = worthwhile(target, drawing, run, changes, worth)
+    made_equal = {contour for change in taken for contour in change.contours}
+    equal = [[group[0], *(part for part in group[1:] if int(part[0]) in made_equal)] for group in groups]
+    return changed(drawing, taken), [group for group in equal if len(group) > 1]
+
+
+def _saved(scene: Scene, part: IndexArray) -> float:
+    """Return the bytes that an outline takes more than its use."""
+    return prices.CUBIC * len(rows_of(scene, part)) / 3 - USE
 
 
 def _likely(scene: Scene) -> list[Equal]:
     """Return groups of parts of shapes with about the same moments, each with its most usual one first."""
     basic = {contour for contour, _ in primitives(scene, scene.points.astype(np.float64))}
     parts = [part for part in parts_of(scene) if len(part) > 1 or int(part[0]) not in basic]
-    parts = [p for p in parts if prices.CUBIC * len(rows_of(scene, p)) / 3 > USE]
+    parts = [part for part in parts if _saved(scene, part) > 0]
     if len(parts) < 2:
         return []
     counts = np.array([len(part) for part in parts])
@@ -82,7 +66,7 @@ def _likely(scene: Scene) -> list[Equal]:
     for i in range(len(parts)):
         if not left[i]:
             continue
-        near = left & (counts == counts[i]) & (np.abs(moments - moments[i]).max(axis=1) <= MOST_APART)
+        near = left & (counts == counts[i]) & (np.abs(moments - moments[i]).max(axis=1) <= MOST_OFF)
         index = np.flatnonzero(near)
         left[index] = False
         if len(index) > 1:
@@ -96,7 +80,9 @@ def _moments(scene: Scene, part: IndexArray) -> tuple[Floats, Floats]:
     places, weights, boxes = [], [], []
     for contour in part.tolist():
         t = (np.arange(SAMPLES_PER_CUBIC) + 0.5) / SAMPLES_PER_CUBIC
-        points = points_at(cubics_of(scene, contour), t).reshape(-1, 2)
+        ring = scene.points[slice(*scene.starts[contour : contour + 2].tolist())].astype(np.float64)
+        following = np.roll(np.arange(len(ring) // 3), -1)
+        points = points_at(with_ends(ring, following), t).reshape(-1, 2)
         along = (np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)) / 2
         places.append(points)
         weights.append(hypot(along[:, 0], along[:, 1]))
@@ -110,34 +96,6 @@ def _moments(scene: Scene, part: IndexArray) -> tuple[Floats, Floats]:
     terms = (u * u, v * v, u * v, u * u * u, v * v * v, u * u * v, u * v * v)
     form = [scale * float((weight * term).sum()) for term in terms]
     return center, np.array([*np.max(boxes, axis=0), *form])
-
-
-def _cells(scene: Scene, part: IndexArray) -> Cells:
-    """Return the cells around an outline."""
-    return joined([own for contour in part.tolist() for own in cells_around(cubics_of(scene, contour))])
-
-
-def _with_nodes_of_one(drawing: Drawing, groups: list[Equal]) -> Drawing:
-    """Return a drawing in which the outlines of a group have the nodes of its first one, moved."""
-    scene, contours = drawing.scene, {}
-    for group in groups:
-        center = _moments(scene, group[0])[0]
-        for part in group[1:]:
-            shift = _moments(scene, part)[0] - center
-            for own, model in zip(part.tolist(), group[0].tolist(), strict=True):
-                rows = slice(*scene.starts[model : model + 2].tolist())
-                contours[own] = scene.points[rows] + shift, drawing.joints[rows]
-    return with_contours(drawing, contours)
-
-
-def _averaged(drawing: Drawing, groups: list[Equal]) -> Drawing:
-    """Return a drawing in which the outlines of each group, which have the same nodes, are their mean."""
-    points = drawing.scene.points.astype(np.float64)
-    for group in groups:
-        rows = np.stack([rows_of(drawing.scene, part) for part in group])
-        places = points[rows].mean(axis=1, keepdims=True)
-        points[rows] = (points[rows] - places).mean(axis=0) + places
-    return replace(drawing, scene=replace(drawing.scene, points=points.astype(np.float32)))
 
 
 def on_grid(scene: Scene, equal: list[Equal], per_pixel: float) -> tuple[Scene, npt.NDArray[np.bool_]]:

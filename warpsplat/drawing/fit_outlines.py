@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats
+from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, with_ends
 from warpsplat.drawing.crossings import Crossings
 from warpsplat.drawing.measure import Measure, Samples, is_shaded
-from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
@@ -21,20 +21,15 @@ from warpsplat.scene import Canvas, FloatArray, Paint, Scene
 LEAST_GAIN, MOST_IDLE = 0.005, 4
 """A refinement ends when so many steps in a row have not lowered the least error by this share."""
 
-DAMPING, RAISED = 0.03, 0.3
-"""Added curvature, as a share, at first, and where a step did not lower the error: more of it gets stuck."""
-
-LEAST_DAMPING, CALMER = 0.002, 0.1
-"""The least of it, and its factor where a step lowered the error."""
+RAISED, CALMER, LEAST_DAMPING = 0.3, 0.1, 0.002
+"""Added curvature, as a share, where a step did not lower the error, as more of it gets stuck; its factor
+where one did, and its least."""
 
 MOST_STEP = 0.7
 """How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
 FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
 """First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
-
-BLURRED_STEP = 2.0
-"""By how much blurred gradients are too small."""
 
 ROAM_RATE, LAST_RATE, LEAST_SIZE = 0.15, 0.012, 1e-12
 """Learning rates of free numbers at the beginning and at the end of ``roam`` [px], and the least size of a
@@ -151,7 +146,7 @@ class OutlineFit:
         ``far``: first steps that follow the blurred residual.
         """
         at, around, idle = self.points, self._around, 0
-        damping = np.full(len(self._following), DAMPING)
+        damping = np.full(len(self._following), CALMER * RAISED)
         for done in range(1, steps + 1):
             gradient = self._measure.gradient(blurred=done <= far)
             if self._paints:
@@ -159,10 +154,11 @@ class OutlineFit:
             if done % LOOKS == 0 and done < steps:
                 self._measure.look()
             freedom = self._constraints.freedom(at)
-            bending = Bending(self._measure.samples(at), self._following)
-            change = newton_step(bending, freedom, gradient, damping, self._measure.least)
+            samples = self._measure.samples(at)
+            equations = Equations(samples, with_ends(at, self._following), self._following)
+            change = newton_step(equations, freedom, gradient, damping, self._measure.least)
             if done <= far:
-                change = BLURRED_STEP * change
+                change = 2 * change  # blurred gradients are too small
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
             at, refused = self._moved(at, change)
             error, now = self._measure.error(at)

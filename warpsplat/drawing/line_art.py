@@ -11,7 +11,6 @@ import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
-from warpsplat.drawing.shapes import merge_near
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
@@ -166,8 +165,32 @@ def with_equal_widths(strokes: Scene) -> Scene:
         return strokes
     widths = strokes.widths.astype(np.float64)
     lengths = lengths_of(strokes) + widths
-    widths, _ = merge_near(widths, lengths / lengths.mean(), ALIKE * ALIKE / 2)
-    return replace(strokes, widths=widths.astype(np.float32))
+    merged = with_near_merged(widths, lengths / lengths.mean(), ALIKE * ALIKE / 2)
+    return replace(strokes, widths=merged.astype(np.float32))
+
+
+def with_near_merged(values: Floats, stiffness: Floats, price: float) -> Floats:
+    """Return values, near ones replaced by their mean.
+
+    Args:
+        values: Shape (value,).
+        stiffness: Cost of the square of each one's change.
+        price: Most that merging two groups may cost.
+    """
+    order = np.argsort(values, kind="stable")
+    mean, weight, size = values[order], np.maximum(stiffness[order], 1e-30), np.ones(len(values), np.intp)
+    while len(mean) > 1:
+        cost = np.diff(mean) ** 2 * weight[1:] * weight[:-1] / (weight[1:] + weight[:-1])
+        k = int(cost.argmin())
+        if cost[k] > price:
+            break
+        mean[k] = (mean[k] * weight[k] + mean[k + 1] * weight[k + 1]) / (weight[k] + weight[k + 1])
+        weight[k] += weight[k + 1]
+        size[k] += size[k + 1]
+        mean, weight, size = (np.delete(x, k + 1) for x in (mean, weight, size))
+    found = np.empty_like(values)
+    found[order] = np.repeat(mean, size)
+    return found
 
 
 def lengths_of(strokes: Scene) -> Floats:

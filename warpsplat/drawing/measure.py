@@ -23,7 +23,7 @@ from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import launch_on_host
 from warpsplat.rendering.renderer import Capacity, Renderer
-from warpsplat.rendering.tiles import TILE, read_tiles, to_tiles, write_tiles
+from warpsplat.rendering.tiles import TILE, from_tiles, read_tiles, to_tiles, write_tiles
 from warpsplat.scene import GRADIENTS, FloatArray, Scene
 
 GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
@@ -35,9 +35,6 @@ FARTHEST = 1.5
 LEAST_CONTRAST, FAINT, HIDDEN = 1e-4, 0.01, 0.1
 """Squares of the contrast below which an outline is not seen, that the faintest seen ones count as, and that
 those count as which are not seen: if they move, what they hide may show."""
-
-MARGIN = 4
-"""How far from the outlines the error is followed, at least [px]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,43 +72,28 @@ def different(numbers: Links) -> Links:
     return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
 
 
-class Surroundings:
-    """The pixels around each cubic, and the tiles that have some."""
+def chords(cubics: Floats) -> Floats:
+    """Return the lengths of the control polygons, shape (cubic,)."""
+    return np.asarray(np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1))
 
-    def __init__(self, cubics: Floats, viewport: Viewport) -> None:
-        """``cubics``: shape (cubic, 4, 2) [px]."""
-        reach = np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1)
-        counts = 2 + np.minimum(np.ceil(reach), viewport.width + viewport.height).astype(np.intp)
-        which = np.repeat(np.arange(len(cubics)), counts)
-        number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-        t = (number + 0.5) / counts[which]
-        x, y = np.floor(points_at(cubics[which], t[:, None])[:, 0]).astype(np.intp).T
-        limits = np.array([viewport.width, viewport.height])
-        corners = np.stack(
-            [np.stack([x + i, y + j], axis=1) for i in (-MARGIN, MARGIN) for j in (-MARGIN, MARGIN)]
-        )
-        column, row = np.clip(corners.reshape(-1, 2), 0, limits - 1).T // TILE
-        self.tiles: Links = different(row * viewport.tiles_x + column)
-        wide, high = limits + 2
-        x, y = np.clip(x + 1, 0, wide - 1), np.clip(y + 1, 0, high - 1)
-        middle = different((which * high + y) * wide + x)
-        near = different(middle + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)])[:, None])
-        x, y = near % wide - 1, near % (wide * high) // wide - 1
-        inside = (x >= 0) & (x < viewport.width) & (y >= 0) & (y < viewport.height)
-        near, x, y = near[inside], x[inside], y[inside]
-        self._cubic, self._count = near // (wide * high), len(cubics)
-        self._tile = y // TILE * viewport.tiles_x + x // TILE
-        self._place = x % TILE * TILE + y % TILE
-        self.follow(self.tiles)
 
-    def follow(self, tiles: Links) -> None:
-        """Take ``tiles``, ascending, with those around the cubics."""
-        self.tiles = tiles
-        self._pixel = np.searchsorted(tiles, self._tile) * TILE * TILE + self._place
+def pixels_around(cubics: Floats, width: int, height: int) -> tuple[Links, Links]:
+    """Return pairs of a cubic and a pixel on or beside it, ascending; pixels by rows.
 
-    def sums(self, pixels: FloatArray) -> Floats:
-        """Return sums of ``pixels`` of ``tiles`` around each cubic, shape (cubic,)."""
-        return summed(self._cubic, pixels.ravel()[self._pixel], self._count)
+    ``cubics``: shape (cubic, 4, 2) [px]; ``width``, ``height``: of the image.
+    """
+    counts = 2 + np.minimum(np.ceil(chords(cubics)), width + height).astype(np.intp)
+    which = np.repeat(np.arange(len(cubics)), counts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    t = (number + 0.5) / counts[which]
+    x, y = np.floor(points_at(cubics[which], t[:, None])[:, 0]).astype(np.intp).T
+    # With a border of one pixel, what is beside it has the next numbers.
+    wide, high = width + 2, height + 2
+    middle = different((which * high + np.clip(y + 1, 0, high - 1)) * wide + np.clip(x + 1, 0, wide - 1))
+    near = different(middle + np.array([j * wide + i for j in (-1, 0, 1) for i in (-1, 0, 1)])[:, None])
+    x, y = near % wide - 1, near // wide % high - 1
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return near[inside] // (wide * high), (y * width + x)[inside]
 
 
 class Measure:
@@ -130,28 +112,17 @@ class Measure:
         self._parameters = Parameters(drawing.scene, backend)
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
-        self._tiles_x = viewport.tiles_x
         self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
-        self._scale = 1 / (3 * viewport.pixel_count)
+        self._size, self._scale = (viewport.width, viewport.height), 1 / (3 * viewport.pixel_count)
         self.least = LEAST_CONTRAST * self._scale
         """Curvature that does not count."""
-        self._near = Surroundings(with_ends(points, self._following), viewport)
-        if is_shaded(drawing.scene).any():
-            self._near.follow(np.arange(viewport.tile_count))
-        self._tiles = self._near.tiles
-        # A slice takes all of them without a copy.
-        self._index = slice(None) if len(self._tiles) == viewport.tile_count else self._tiles
-        goal = to_tiles(target)
-        self._target = goal[self._index]
-        self._inside = read_tiles(self._renderer.film.buffers.inside)[self._index, None]
-        self._grad = np.zeros_like(goal)
+        self._target = to_tiles(target)
+        self._inside = read_tiles(self._renderer.film.buffers.inside)[:, None]
+        cubics = with_ends(points, self._following)
+        self._cubic, pixel = pixels_around(cubics, viewport.width, viewport.height)
+        y, x = np.divmod(pixel, viewport.width)
+        self._pixel = ((y // TILE * viewport.tiles_x + x // TILE) * TILE + x % TILE) * TILE + y % TILE
         self._render(points)
-        elsewhere = np.ones(len(goal), np.bool_)
-        elsewhere[self._tiles] = False
-        film = self._renderer.film.buffers
-        inside = read_tiles(film.inside)[elsewhere, None]
-        rest = (read_tiles(film.image)[elsewhere] - goal[elsewhere]) * inside
-        self._rest = float(squares(rest, axis=1).sum(dtype=np.float64))
 
     @property
     def capacity(self) -> Capacity:
@@ -174,11 +145,10 @@ class Measure:
     def error(self, points: Floats) -> tuple[float, Floats]:
         """Return the mean squared error with the outlines at ``points``, and the part around each cubic."""
         self._render(points)
-        self._residual = read_tiles(self._renderer.film.buffers.image)[self._index] - self._target
-        self._residual *= self._inside
+        self._residual = (read_tiles(self._renderer.film.buffers.image) - self._target) * self._inside
         parts = squares(self._residual, axis=1)
-        total = self._rest + float(parts.sum(dtype=np.float64))
-        return total * self._scale, self._near.sums(parts) * self._scale
+        around = summed(self._cubic, parts.ravel()[self._pixel], len(self._following))
+        return float(parts.sum(dtype=np.float64)) * self._scale, around * self._scale
 
     def gradient(self, *, blurred: bool = False) -> Floats:
         """Return the derivative of the last ``error`` by the points' coordinates, shape (2 x point,).
@@ -186,7 +156,12 @@ class Measure:
         ``blurred``: of the residual. An outline on the border of two pixels may already suit the one that it
         comes from, and the error itself says nothing of the other one before it is there.
         """
-        residual = self._blurred(self._residual) if blurred else self._residual
+        residual = self._residual
+        if blurred:
+            image = np.pad(from_tiles(residual, *self._size), ((1, 1), (1, 1), (0, 0)))
+            rows = image[:-2] + 2 * image[1:-1] + image[2:]
+            image = (rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:]) / 16
+            residual = to_tiles(image)
         self._back(self._by_image(residual))
         return self._parameters.arrays["points_grad"].numpy().astype(np.float64).ravel()
 
@@ -270,8 +245,7 @@ class Measure:
         if not self._is_fresh:
             self._renderer.forward()
         self._is_fresh = False
-        self._grad[self._index] = image_grad
-        write_tiles(self._renderer.film.buffers.image_grad, self._grad)
+        write_tiles(self._renderer.film.buffers.image_grad, image_grad)
         self._renderer.backward()
 
     def _by_image(self, residual: FloatArray) -> FloatArray:
@@ -285,29 +259,6 @@ class Measure:
         found[:, 3] = 3 * opacity - (red + green + blue)
         found *= np.float32(self._scale)
         return found
-
-    def _blurred(self, residual: FloatArray) -> FloatArray:
-        """Return ``residual`` blurred by 1/4, 1/2, 1/4 along both axes; beyond its tiles there is none."""
-        quarter = np.float32(0.25)
-        for axis in (2, 3):
-            values = np.swapaxes(residual, 0, axis)
-            blurred = 2 * quarter * values
-            blurred[1:] += quarter * values[:-1]
-            blurred[:-1] += quarter * values[1:]
-            for sign, edge, other in ((-1, 0, -1), (1, -1, 0)):
-                here, there = self._beside(axis, sign)
-                lines = np.swapaxes(blurred[edge], 0, axis - 1)
-                lines[here] += quarter * np.swapaxes(values[other], 0, axis - 1)[there]
-            residual = np.swapaxes(blurred, 0, axis)
-        return residual
-
-    def _beside(self, axis: int, sign: int) -> tuple[Links, Links]:
-        """Return which of the tiles have one beside them along an axis of tiles, and that one."""
-        wanted = self._tiles + sign * (1 if axis == 2 else self._tiles_x)
-        there = np.minimum(np.searchsorted(self._tiles, wanted), len(wanted) - 1)
-        in_row = wanted // self._tiles_x == self._tiles // self._tiles_x
-        here = np.flatnonzero((self._tiles[there] == wanted) & (in_row | (axis == 3)))
-        return here, there[here]
 
     def _channels(self) -> Iterator[FloatArray]:
         """Yield gradients of the image whose squares add up to the squared error's.

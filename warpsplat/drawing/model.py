@@ -6,26 +6,44 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, Links, rows_of, with_ends
-from warpsplat.drawing.measure import Samples
+from warpsplat.drawing.constraints import (
+    Constraints,
+    Drawing,
+    Flags,
+    Floats,
+    Links,
+    rows_of,
+    summed,
+    with_ends,
+)
+from warpsplat.drawing.measure import Samples, chords
 from warpsplat.drawing.nodes import WITHOUT, Edits
-from warpsplat.drawing.solve import Bending, newton_step
+from warpsplat.drawing.solve import Equations, newton_step
+from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.kernels.drawing import samples as kernels
 from warpsplat.rendering.program import launch_on_host
+from warpsplat.scene.scene import ranges
 
-STEPS, PLACING_ROUNDS = 2, 2
+STEPS = 2
 """Steps of a fit, and of finding where on its piece a sample lies before each."""
 
 DAMPING = 0.01
 """Added curvature, as a share."""
 
 
-def placed(samples: Samples, cubics: Floats, rounds: int = PLACING_ROUNDS) -> Samples:
+def placed(samples: Samples, cubics: Floats) -> Samples:
     """Return samples at the places of ``cubics``, shape (cubic, 4, 2), that are nearest to theirs."""
     t, count = samples.t.copy(), len(cubics)
-    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "rounds": rounds}
+    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "rounds": STEPS}
     launch_on_host(kernels.nearest, count, samples, values, t=t)
     return replace(samples, t=t)
+
+
+def errors(samples: Samples, cubics: Floats) -> Floats:
+    """Return the errors of the samples on ``cubics``, shape (cubic,)."""
+    here = points_at(cubics[samples.cubic], samples.t[:, None])[:, 0]
+    off = ((here - samples.place) * samples.across).sum(axis=1)
+    return summed(samples.cubic, samples.weight * off * off, len(cubics))
 
 
 def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
@@ -33,10 +51,16 @@ def before_fit(samples: Samples, drawing: Drawing, edits: Edits) -> Floats:
     cubics, share = drawing.cubics(), _shares(drawing, edits.at)
     joined = np.flatnonzero(edits.kind == WITHOUT)
     instead = np.concatenate([edits.at, drawing.neighbours()[0][edits.at[joined]]])
+    # Where on the new cubic the old one would begin and end.
     low, high = np.zeros(len(instead)), np.ones(len(instead))
     low[joined] = high[len(edits.at) :] = share[joined]
+    first = samples.starts(len(cubics))
+    counts = np.diff(first)[instead]
+    moved = samples.take(ranges(first[instead], counts))
+    cubic = np.repeat(np.arange(len(instead)), counts)
+    moved = replace(moved, cubic=cubic, t=low[cubic] + (high - low)[cubic] * moved.t)
     made = np.concatenate([edits.cubics, edits.cubics[joined]])
-    growth = _errors(samples, made, instead, low, high, len(cubics)) - errors(samples, cubics)[instead]
+    growth = errors(placed(moved, made), made) - errors(samples, cubics)[instead]
     growth[joined] += growth[len(edits.at) :]
     return growth[: len(edits.at)]
 
@@ -46,34 +70,6 @@ def _shares(drawing: Drawing, at: Links) -> Floats:
     cubics, before = drawing.cubics(), drawing.neighbours()[0]
     lengths = [chords(cubics[rows]) for rows in (before[at], at)]
     return np.asarray(lengths[0] / np.maximum(lengths[0] + lengths[1], 1e-9))
-
-
-def chords(cubics: Floats) -> Floats:
-    """Return the lengths of the control polygons."""
-    return np.asarray(np.linalg.norm(np.diff(cubics, axis=1), axis=2).sum(axis=1))
-
-
-def errors(samples: Samples, cubics: Floats) -> Floats:
-    """Return the errors of the samples on ``cubics``, shape (cubic,)."""
-    count = len(cubics)
-    return _errors(samples, cubics, np.arange(count), np.zeros(count), np.ones(count), count, rounds=0)
-
-
-def _errors(
-    samples: Samples,
-    cubics: Floats,
-    instead: Links,
-    low: Floats,
-    high: Floats,
-    count: int,
-    rounds: int = PLACING_ROUNDS,
-) -> Floats:
-    """Return the errors of the samples of ``instead``, of ``count`` cubics, on other ones, shape (cubic,)."""
-    found = np.zeros(len(cubics))
-    values = {"cubics": rows_of(cubics), "first": samples.starts(count), "instead": instead}
-    values |= {"low": low, "high": high, "error": found}
-    launch_on_host(kernels.errors, len(found), samples, values, rounds=rounds)
-    return found
 
 
 def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Samples:
@@ -113,9 +109,9 @@ def _fitted(samples: Samples, drawing: Drawing, least: float) -> tuple[Floats, S
     samples = placed(samples, with_ends(points, following))
     damping = np.full(len(following), DAMPING)
     for _ in range(STEPS):
-        bending, freedom = Bending(samples, following), constraints.freedom(points)
-        gradient = bending.gradient(with_ends(points, following))
-        change = np.clip(newton_step(bending, freedom, gradient, damping, least), -1, 1)
+        equations = Equations(samples, with_ends(points, following), following)
+        freedom = constraints.freedom(points)
+        change = np.clip(newton_step(equations, freedom, equations.gradient, damping, least), -1, 1)
         points = constraints.project(points + freedom.times(change).reshape(-1, 2))
         samples = placed(samples, with_ends(points, following))
     return points, samples

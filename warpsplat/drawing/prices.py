@@ -16,10 +16,14 @@ that nobody would miss."""
 NUMBER = 3.4
 """Bytes of a number of path data with the sign or the space before it, the mean of 20 logos."""
 
-CUBIC, LINE, LEVEL, HANDLES, MOVE = 6 * NUMBER, 2 * NUMBER, NUMBER, 4 * NUMBER, 2 * NUMBER
-"""Bytes of a cubic, a line, a level line, the handles of a cubic, and the beginning of a contour."""
+CUBIC, LINE, LEVEL = 6 * NUMBER, 2 * NUMBER, NUMBER
+"""Bytes of a cubic, a line, and a level line."""
 
-REGION, SHADED = PATH + MOVE + 4 * CUBIC, GRADIENT + PATH + MOVE + 4 * CUBIC
+HANDLES, MOVE = CUBIC - LINE, LINE
+"""Bytes of the handles of a cubic, and the beginning of a contour."""
+
+REGION = PATH + MOVE + 4 * CUBIC
+SHADED = REGION + GRADIENT
 """Bytes of a path with a contour of four cubics, in a colour and in a gradient."""
 
 TAG = len('path d=""')

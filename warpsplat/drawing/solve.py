@@ -12,33 +12,22 @@ from warpsplat.rendering.program import launch_on_host
 ITERATIONS, CONVERGED = 60, 1e-4
 """Most steps of conjugate gradients, and the square of the residual, over the first, at which they end."""
 
-PAIRS = 30
-"""Numbers of the second derivatives by pairs of a cubic's control points."""
 
+class Equations:
+    """The derivatives of the error of outlines: the second by cubics, the first by coordinates."""
 
-class Bending:
-    """The second derivative of the error of outlines, by cubics."""
-
-    def __init__(self, samples: Samples, following: Links) -> None:
-        """``following``: as ``Drawing.following``."""
-        self._samples, self.following = samples, following
-        self.count = len(following)
-        self._first = samples.starts(self.count)
-        self.blocks = np.zeros((self.count, PAIRS))
-        launch_on_host(newton.curvature, self.count, samples, first=self._first, blocks=self.blocks)
-
-    def gradient(self, cubics: Floats) -> Floats:
-        """Return the derivative of the samples' error by the coordinates with which cubics begin."""
-        by_corner = np.zeros((self.count, 8))
-        values = {"cubics": rows_of(cubics), "first": self._first, "gradient": by_corner}
-        launch_on_host(newton.slopes, self.count, self._samples, values)
-        gradient = by_corner[:, :6].copy()
-        gradient[self.following, :2] += by_corner[:, 6:]  # each cubic follows one other
-        return gradient.ravel()
+    def __init__(self, samples: Samples, cubics: Floats, following: Links) -> None:
+        """``cubics``: shape (cubic, 4, 2); ``following``: as ``Drawing.following``."""
+        self.following, count = following, len(following)
+        self.blocks, by_corner = np.zeros((count, 30)), np.zeros((count, 8))
+        values = {"cubics": rows_of(cubics), "first": samples.starts(count), "gradient": by_corner}
+        launch_on_host(newton.derivatives, count, samples, values, blocks=self.blocks)
+        by_corner[following, :2] += by_corner[:, 6:]  # each cubic follows one other
+        self.gradient = by_corner[:, :6].ravel()
 
 
 def newton_step(
-    bending: Bending, freedom: Freedom, gradient: Floats, damping: Floats, least: float
+    equations: Equations, freedom: Freedom, gradient: Floats, damping: Floats, least: float
 ) -> Floats:
     """Return the free numbers that lower the error most, if the curvature grows by a share ``damping``.
 
@@ -50,7 +39,7 @@ def newton_step(
         newton.solve,
         len(freedom.contour_first) - 1,
         freedom,
-        bending,
+        equations,
         arrays,
         gradient=gradient,
         damping=damping,

@@ -8,21 +8,17 @@ from functools import partial
 
 import numpy as np
 
-from warpsplat.alpha import squares
 from warpsplat.drawing import model
-from warpsplat.drawing.cells import by_cell
-from warpsplat.drawing.constraints import DRAFT_GRID, Constraints, Drawing, Finished, Flags, Floats, Links
+from warpsplat.drawing.changes import changed, worthwhile
+from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished, Flags, Links
 from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import apart, applied, candidates
 from warpsplat.drawing.prices import LEAST_ERROR, worth
-from warpsplat.drawing.shapes import with_shapes
+from warpsplat.drawing.shapes import shape_changes
 from warpsplat.fit.problem import Run
 from warpsplat.metrics import decibels
-from warpsplat.rendering.backend import Viewport
-from warpsplat.rendering.renderer import render
-from warpsplat.rendering.tiles import to_tiles
 from warpsplat.scene import FloatArray
 from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.sizes import estimated_size
@@ -34,7 +30,7 @@ FIRST_STEPS, SECOND_STEPS, THIRD_STEPS = 16, 12, 6
 FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
 """Steps of Adam after the first two fits, where they are needed, and pixels that all of these may render."""
 
-FIRST_FAR, SECOND_FAR = 4, 3
+FAR = 4
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
 
 RECOVERED = 10.0
@@ -77,17 +73,21 @@ def finish_drawing(
     byte = partial(worth, price=price, negligible=negligible)
     parts = [run.part(i / 3, (i + 1) / 3) for i in range(3)]
     fit = OutlineFit(target, drawing, run)
-    fit.advance(parts[0], FIRST_STEPS, FIRST_FAR)
+    fit.advance(parts[0], FIRST_STEPS, FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, byte, run.over), run, fit.capacity)
-        fit.advance(parts[1], SECOND_STEPS, SECOND_FAR)
+        fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
     equal: list[Equal] = []
     if tidy and not run.over():
-        fitted = fit.drawing
-        exact, equal = with_exact_shapes(target, fitted, run, byte, symbols=symbols)
-        if exact is not fitted:
+        exact, worth_of_byte = fit.drawing, byte(fit.error, estimated_size(fit.drawing.scene, DRAFT_GRID))
+        shapes = shape_changes(exact, fit.places(), worth_of_byte, run.over)
+        shapes = worthwhile(target, exact, run, shapes, worth_of_byte)
+        exact = changed(exact, shapes)
+        if symbols:
+            exact, equal = with_equal_outlines(target, exact, run, worth_of_byte)
+        if shapes or equal:
             fit = OutlineFit(target, exact, run, fit.capacity)
     if run.over():
         return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
@@ -108,31 +108,6 @@ def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int, negligible:
         quiet = replace(run, on_progress=None)
         fit.roam(quiet, min(steps, ROAM_PIXELS // target[..., 0].size))
         fit.advance(quiet, THIRD_STEPS)
-
-
-def with_exact_shapes(
-    target: FloatArray, drawing: Drawing, run: Run, byte_of: Worth, *, symbols: bool
-) -> tuple[Drawing, list[Equal]]:
-    """Return a drawing with exact basic shapes and, for ``symbols``, equal outlines."""
-
-    def errors_of(made: Drawing) -> Floats:
-        points = Constraints(made).project(made.cubics()[:, :3].reshape(-1, 2))
-        scene = replace(made.scene, points=points.astype(np.float32))
-        away = squares(render(scene, backend=run.backend) - target)
-        viewport = Viewport(target.shape[1], target.shape[0])
-        return by_cell(to_tiles(away[..., None])[:, 0], viewport) / (3 * viewport.pixel_count)
-
-    def refit(made: Drawing) -> Drawing:
-        fit = OutlineFit(target, made, run)
-        fit.advance(replace(run, on_progress=None), SECOND_STEPS)
-        return fit.drawing
-
-    errors = errors_of(drawing)
-    byte = byte_of(float(errors.sum()), estimated_size(drawing.scene, DRAFT_GRID))
-    exact = with_shapes(target, drawing, errors_of, errors, byte, run.over)
-    if not symbols:
-        return exact, []
-    return with_equal_outlines(exact, errors_of, errors_of(exact), byte, refit)
 
 
 def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = bool) -> Drawing:
@@ -193,11 +168,10 @@ def touched(contours: Links, count: int) -> Flags:
 def drawing_grid(fit: OutlineFit, finest: float, byte_of: Worth) -> float:
     """Return the view box units per pixel that cost least, in bytes and in error after refitting."""
     scene, samples = fit.drawing.scene, fit.places()
-    before = model.errors(samples, fit.drawing.cubics()).sum()
     byte = byte_of(fit.error, estimated_size(scene, DRAFT_GRID))
     costs = {}
     for grid in [g for g in GRIDS if 1 <= g < finest] + [finest]:
         low = replace(fit.drawing, scene=rounded(scene, grid))
-        loss = float(model.errors(samples, low.cubics()).sum() - before)
-        costs[grid] = loss + byte * estimated_size(scene, grid)
+        error = float(model.errors(samples, low.cubics()).sum())
+        costs[grid] = error + byte * estimated_size(scene, grid)
     return min(costs, key=costs.__getitem__)
