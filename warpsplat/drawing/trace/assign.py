@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
 from warpsplat.drawing.trace.palette import Parts
 
-SMALL, TINY = (60, REACH), (12, 2 * REACH)
-"""Pixels of the largest region that may be given up, and how far away the regions may lie that it is mixed of
-[px]: the tips of stars are long."""
+SMALL = 60  # [px] of the largest region that may be given up
 
-INVISIBLE = 120.0  # [levels] sum of the residuals of a region that is given up, at the most
-INVISIBLE_PIXEL, MOST_COUNTED = 40.0, 8  # [levels] the same for each pixel, of which no more than these count
+REACHES = REACH, REACH, 2 * REACH
+"""How far away the regions may lie that it is mixed of, in turn [px]: the tips of stars are long."""
 
 
 def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
@@ -39,24 +38,24 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
 def without_specks(
     image: Floats, painted: Ints, fills: Floats, noise: float, price: float = 1.0
 ) -> tuple[Ints, Floats]:
-    """Give up small regions that are little more than mixtures of what is around them.
+    """Give up small regions, and pixels of such ones, that are little more than mixtures of what is around.
 
     ``price``: as for ``find_regions``.
     """
     painted, fills = painted.copy(), fills.copy()
-    for most, reach in SMALL, TINY:
+    for reach in REACHES:
         regions = components(painted, image)
         sizes = np.bincount(regions.reshape(-1))
-        small = (sizes <= most)[regions]
+        small = (sizes <= SMALL)[regions]
         rows, columns = np.nonzero(small)
         if not len(rows) or small.all():
             continue
         others = np.where(small, NO_REGION, painted).astype(np.int32)
         mixtures = unmix(image, others, fills, rows, columns, noise, reach)
-        visible = np.maximum(mixtures.residual - (MIXED + noise), 0)
-        owner = regions[rows, columns]
-        limit = np.maximum(INVISIBLE, INVISIBLE_PIXEL * np.minimum(sizes, MOST_COUNTED)) * min(price, 1)
-        gone = (np.bincount(owner, visible, len(sizes)) <= limit)[owner]
+        owner, values = regions[rows, columns], 3 * painted.size
+        byte = prices.worth((noise / 255) ** 2, prices.REGION * len(sizes), price=price)
+        error = 3 * np.bincount(owner, np.square(mixtures.residual), len(sizes)) / (values * 255**2)
+        gone = (error <= prices.REGION * byte)[owner] | (mixtures.residual <= MIXED + noise)
         rows, columns = rows[gone], columns[gone]
         painted[rows, columns], fills[rows, columns] = mixtures.label[gone], mixtures.color[gone]
     return painted, fills

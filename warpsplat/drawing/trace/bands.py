@@ -194,13 +194,11 @@ def _piece(image: Floats, left: int, top: int, mask: Bools, gradients: Gradients
     pixels = box[mask].astype(np.float64)
     mean = pixels.mean(axis=0)
     flat = float(((pixels - mean) ** 2).sum())
-    best = _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
     ramp = fit_ramp(box, mask, left, top, gradients)
-    if ramp is not None:
+    if ramp and ramp.is_better_than(flat / pixels.size):
         error = pixels.size * ramp.residual**2
-        if error < flat * prices.REGION / prices.SHADED:
-            return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
-    return best
+        return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
+    return _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
 
 
 def _with_bands(image: Floats, parts: Parts, pieces: list[_Piece]) -> Parts:

@@ -14,7 +14,6 @@ CLEAR = 2.5  # [levels] opacity below which nothing is painted
 LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
 UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
 UNEVEN_NOISE = 3.0  # what a level of noise adds to that
-GAIN = 0.6  # a ramp must leave less than this share of a flat colour's residual
 SAME = 1.5  # [levels] colours that differ by less are one
 SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
 
@@ -70,7 +69,7 @@ def paint_parts(image: Floats, labels: Ints, noise: float, gradients: Gradients 
         box = boxes[part].slices()
         left, top = boxes[part].left, boxes[part].top
         ramp = fit_ramp(image[box], labels[box] == part, left, top, gradients)
-        if ramp is not None and ramp.residual < GAIN * float(residual[part]):
+        if ramp and ramp.is_better_than(float(residual[part] * residual[part])):
             paint[part] = len(colorings)
             colorings.append(Coloring(means[part], ramp))
     flat = np.flatnonzero(paint == NO_REGION)

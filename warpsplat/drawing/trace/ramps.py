@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
@@ -44,6 +45,10 @@ class Ramp:
     """Colours of the stops, shape (stop, channel)."""
     residual: float
     """Root mean square of the error over all channels [levels]."""
+
+    def is_better_than(self, flat: float) -> bool:
+        """Return whether it is worth its bytes beside a flat colour of mean squared error ``flat``."""
+        return self.residual * self.residual * prices.SHADED < flat * prices.REGION
 
 
 def fit_ramp(

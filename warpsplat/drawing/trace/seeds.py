@@ -23,8 +23,7 @@ BEND_OF_NOISE, ROUNDING = 1.7, 0.6
 FLAT_STEP = 1.0  # [levels] largest step between neighbours of a flat region, besides noise
 RAMP_STEP = 12.0  # [levels] largest step between neighbours on a ramp, besides noise; more is an edge
 RAMP_BEND = 2.0  # [levels] largest change of that step from one pixel to the next, besides noise
-LEAST_FLAT = 4  # [px] in a flat seed: a block of two by two
-LEAST_RAMP = 9  # [px] in a seed on a ramp: antialiasing looks like smaller ones
+LEAST_RAMP = 9  # [px] in a seed that is flat nowhere: antialiasing looks like smaller ones
 
 
 def noise_of(image: Floats) -> float:
@@ -97,7 +96,6 @@ def _without_tiny(parts: Ints, count: int, flat: Bools) -> Ints:
         return parts
     inside = parts >= 0
     sizes = np.bincount(parts[inside], minlength=count)
-    flat_sizes = np.bincount(parts[inside & flat], minlength=count)
-    keep = (sizes >= LEAST_RAMP) | (flat_sizes >= LEAST_FLAT)
+    keep = (sizes >= LEAST_RAMP) | (np.bincount(parts[flat], minlength=count) > 0)
     number = np.where(keep, np.cumsum(keep) - 1, NO_REGION).astype(np.int32)
     return np.where(inside, number[parts], NO_REGION)
