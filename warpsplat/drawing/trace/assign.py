@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
-from warpsplat.drawing.trace.palette import Parts
+from warpsplat.drawing.trace.palette import Parts, least_worth
 
 SMALL = 60  # [px] of the largest region that may be given up
 
@@ -52,10 +51,10 @@ def without_specks(
             continue
         others = np.where(small, NO_REGION, painted).astype(np.int32)
         mixtures = unmix(image, others, fills, rows, columns, noise, reach)
-        owner, values = regions[rows, columns], 3 * painted.size
-        byte = prices.worth((noise / 255) ** 2, prices.REGION * len(sizes), price=price)
-        error = 3 * np.bincount(owner, np.square(mixtures.residual), len(sizes)) / (values * 255**2)
-        gone = (error <= prices.REGION * byte)[owner] | (mixtures.residual <= MIXED + noise)
+        owner, least = regions[rows, columns], least_worth(len(sizes), painted.size, noise, price=price)
+        visible = np.maximum(mixtures.residual - (MIXED + noise), 0)
+        error = np.bincount(owner, np.square(visible), len(sizes))
+        gone = (error <= least)[owner] | (visible == 0)
         rows, columns = rows[gone], columns[gone]
         painted[rows, columns], fills[rows, columns] = mixtures.label[gone], mixtures.color[gone]
     return painted, fills

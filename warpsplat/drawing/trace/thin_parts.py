@@ -10,7 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
 from warpsplat.drawing.trace.mixtures import MIXED, mixed, unmix
-from warpsplat.drawing.trace.palette import Coloring, Parts
+from warpsplat.drawing.trace.palette import Coloring, Parts, least_worth
 
 MOST_PARTS = 4000  # that are looked at, the largest first; an image with more is no drawing
 COVERED = 0.35  # least share of the part's colour in a pixel that belongs to it
@@ -35,6 +35,8 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
     paint, colorings = parts.paint.tolist(), list(parts.colorings)
     flat = [i for i, coloring in enumerate(colorings) if coloring.ramp is None]
     for y, x in _components_by_size(residual > limit):
+        if np.square(residual[y, x]).sum() <= least_worth(len(paint), residual.size, noise, negligible=0):
+            continue
         pixels, beside, off = image[y, x], bases[y, x], residual[y, x]
         top = _highest(off, 0.5)
         known = np.array([colorings[i].color for i in flat])
