@@ -14,7 +14,7 @@ from warpsplat.drawing.trace.palette import Parts, least_worth
 
 SMALL = 60  # [px] of the largest region that may be given up
 
-REACHES = REACH, REACH, 2 * REACH
+REACHES = REACH, REACH, REACH, 2 * REACH
 """How far away the regions may lie that it is mixed of, in turn [px]: the tips of stars are long."""
 
 
