@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max
+from warpsplat.drawing.trace.lattice import MOST_COLORS
 from warpsplat.drawing.trace.regions import MOST_NOISE, NEGLIGIBLE_NOISE
-from warpsplat.drawing.trace.seeds import noise_of
+from warpsplat.drawing.trace.seeds import OUTLIERS, noise_of
 from warpsplat.scene import FloatArray
 
 LIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
@@ -24,12 +25,6 @@ BLURRED = 0.75
 
 LEAST_FLAT = 16
 """Pixels of a flat colour: a block of four by four."""
-
-MOST_COLORS = 64
-"""Most colours of an image without gradients that are looked for."""
-
-OUTLIERS = 3
-"""How far outliers are from a flat colour, over its usual noise."""
 
 WINDOW = 9
 """Side of the square in which noise averages out [px]; where the mean is off, the colour is no flat one."""

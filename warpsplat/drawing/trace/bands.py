@@ -14,6 +14,7 @@ from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes, unchecked
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
 from warpsplat.drawing.trace.ramps import Gradients, fit_ramp
+from warpsplat.drawing.trace.seeds import ROUNDING
 from warpsplat.portable import filters
 from warpsplat.portable.linear import product
 from warpsplat.scene.attributes import GRADIENTS
@@ -21,7 +22,6 @@ from warpsplat.scene.attributes import GRADIENTS
 LEAST_BAND = 30  # [px] of a band; smaller pieces stay with what surrounds them
 MOST_BANDS = 256  # of an image
 SOFT = 1.5  # [px] standard deviation of the blur before a part is cut, so that noise does not fray the bands
-ONE_TONE = 1.0  # [levels] root mean square by which colours of one tone are off a line, besides noise
 POWERS = 8  # steps of the power iteration
 TONES = 64  # levels of tone among which a part is cut in two
 
@@ -102,7 +102,7 @@ def _is_one_tone(pixels: Floats, noise: float) -> bool:
     """Return whether colours, shape (pixel, channel), lie on a line, so that bands of one tone show them."""
     off = pixels.astype(np.float64) - pixels.mean(axis=0, dtype=np.float64)
     along = (off * _direction(off)).sum(axis=1)
-    return float((off**2).sum() - (along**2).sum()) <= off.size * (ONE_TONE + noise) ** 2
+    return float((off**2).sum() - (along**2).sum()) <= off.size * (ROUNDING + noise) ** 2
 
 
 def _worthwhile(piece: _Piece, worth: float) -> list[_Piece]:
@@ -194,13 +194,11 @@ def _piece(image: Floats, left: int, top: int, mask: Bools, gradients: Gradients
     pixels = box[mask].astype(np.float64)
     mean = pixels.mean(axis=0)
     flat = float(((pixels - mean) ** 2).sum())
-    best = _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
     ramp = fit_ramp(box, mask, left, top, gradients)
-    if ramp is not None:
+    if ramp and ramp.is_better_than(flat / pixels.size):
         error = pixels.size * ramp.residual**2
-        if error < flat * prices.REGION / prices.SHADED:
-            return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
-    return best
+        return _Piece(left, top, mask, Coloring(mean, ramp, is_band=True), error)
+    return _Piece(left, top, mask, Coloring(np.round(mean), is_band=True), flat)
 
 
 def _with_bands(image: Floats, parts: Parts, pieces: list[_Piece]) -> Parts:

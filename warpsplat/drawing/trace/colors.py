@@ -10,7 +10,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.drawing.trace.partition import Partition
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.shares import ROUNDING
+from warpsplat.drawing.trace.seeds import ROUNDING
 
 SWEEPS = 8  # over all colours, each of which is the best one beside the others
 

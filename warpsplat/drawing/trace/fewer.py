@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import Floats, Ints, Sets
 from warpsplat.drawing.trace.nesting import shared_borders
+from warpsplat.drawing.trace.palette import least_worth
 from warpsplat.drawing.trace.regions import Regions
 
 
@@ -21,11 +21,10 @@ def fewer_regions(regions: Regions, most: int, price: float = 1.0) -> Regions:
         most: Regions that are left at the most.
         price: Of a byte, over its usual one: beyond 1, regions that show less than that is worth go too.
     """
-    count, values = len(regions.paint), 3 * regions.labels.size
+    count = len(regions.paint)
     if count <= most and price <= 1:
         return regions
-    byte = prices.worth((regions.noise / 255) ** 2, prices.REGION * count, price=max(price - 1, 0))
-    dearest = values * 255**2 * prices.REGION * byte
+    dearest = 3 * least_worth(count, regions.labels.size, regions.noise, price=max(price - 1, 0))
     beside: list[set[int]] = [set() for _ in range(count)]
     for a, b in shared_borders(regions.labels, count):
         beside[a].add(b)

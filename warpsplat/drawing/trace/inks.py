@@ -59,10 +59,10 @@ def with_inks(regions: Regions) -> Regions:
         colors[k] = np.round(np.median(pixels[order[:DARKEST]], axis=0))
     paint, colorings, inks = regions.paint.copy(), list(regions.colorings), list(solid)
     for k in sorted(bases, key=lambda k: (-float(((colors[k] - bases[k]) ** 2).sum()), k)):
-        offs = {j: _off(colors[k] - bases[k], colors[j] - bases[k]) for j in inks}
-        ink = min(offs, key=offs.__getitem__)
-        if offs[ink] <= MIXED:
-            paint[regions.paint == k] = ink
+        share, off = mixed(colors[k], np.array([colors[j] for j in inks]), bases[k])
+        off = np.where(share >= LEAST_INK, off, np.inf)
+        if off.min() <= MIXED:
+            paint[regions.paint == k] = inks[off.argmin()]
         else:
             inks.append(k)
             colorings[k] = replace(colorings[k], color=colors[k])
@@ -186,9 +186,3 @@ def _is_solid(image: Floats, own: Bools, color: Floats) -> bool:
         return True
     _, _, stats, _ = cv2.connectedComponentsWithStats(exact.astype(np.uint8), connectivity=8)
     return bool((stats[1:, cv2.CC_STAT_AREA] >= SOLID).any())
-
-
-def _off(away: Floats, toward: Floats) -> float:
-    """Return how far a colour is from all mixtures that have enough of an ink [levels]; all from the base."""
-    share = float((away * toward).sum()) / max(float((toward**2).sum()), 1.0)
-    return float(np.abs(away - min(share, 1.0) * toward).max()) if share >= LEAST_INK else np.inf

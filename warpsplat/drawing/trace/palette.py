@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, bounding_boxes, channel_max
 from warpsplat.drawing.trace.ramps import Gradients, Ramp, fit_ramp
 from warpsplat.scene.attributes import GRADIENTS
@@ -14,7 +15,6 @@ CLEAR = 2.5  # [levels] opacity below which nothing is painted
 LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without and with noise
 UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
 UNEVEN_NOISE = 3.0  # what a level of noise adds to that
-GAIN = 0.6  # a ramp must leave less than this share of a flat colour's residual
 SAME = 1.5  # [levels] colours that differ by less are one
 SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
 
@@ -49,6 +49,19 @@ class Parts:
     colorings: list[Coloring]
 
 
+def least_worth(count: int, pixels: int, noise: float, **options: float) -> float:
+    """Return the sum of squared errors (one channel) that a region must save [levels squared].
+
+    Args:
+        count: Regions of an image.
+        pixels: Of the image.
+        noise: Of flat regions [levels].
+        options: Of ``prices.worth``.
+    """
+    byte = prices.worth((noise / 255) ** 2, prices.REGION * count, **options)
+    return pixels * 255**2 * prices.REGION * byte
+
+
 def paint_parts(image: Floats, labels: Ints, noise: float, gradients: Gradients = GRADIENTS) -> Parts:
     """Find the colour or the ramp of each part; parts of nearly one colour share it."""
     count = int(labels.max()) + 1
@@ -70,22 +83,16 @@ def paint_parts(image: Floats, labels: Ints, noise: float, gradients: Gradients 
         box = boxes[part].slices()
         left, top = boxes[part].left, boxes[part].top
         ramp = fit_ramp(image[box], labels[box] == part, left, top, gradients)
-        if ramp is not None and ramp.residual < GAIN * float(residual[part]):
+        if ramp and ramp.is_better_than(float(residual[part] * residual[part])):
             paint[part] = len(colorings)
             colorings.append(Coloring(means[part], ramp))
-    flat = np.flatnonzero(paint == NO_REGION)
-    shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[flat], sizes[flat], noise)
-    paint[flat] = len(colorings) + shared
-    fills = image.copy()
-    colors = np.array([coloring.color for coloring in flat_colorings]).reshape(-1, image.shape[2])
-    every = np.zeros((count, image.shape[2]), np.float32)
-    every[flat] = colors[shared]
-    is_flat = np.zeros(count, np.bool_)
-    is_flat[flat] = True
-    whole = inside.copy()
-    whole[inside] = is_flat[owners]
-    fills[whole] = every[labels[whole]]
-    return Parts(labels, fills, paint, colorings + flat_colorings)
+    is_flat = paint == NO_REGION
+    shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[is_flat], sizes[is_flat], noise)
+    paint[is_flat] = len(colorings) + shared
+    colorings += flat_colorings
+    colors = np.array([coloring.color for coloring in colorings], np.float32)[paint]
+    fills = np.where((inside & is_flat[labels])[..., None], colors[labels], image)
+    return Parts(labels, fills, paint, colorings)
 
 
 def _modes(pixels: Floats, owners: Ints, count: int) -> Floats:

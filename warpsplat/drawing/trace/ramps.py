@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from warpsplat.drawing import prices
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
+from warpsplat.drawing.trace.seeds import ROUNDING
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import eigh, product, solve, solve_banded
@@ -24,7 +26,6 @@ BLUR = 1.5  # [px] standard deviation of the filter before that
 BINS = 48  # places along a ramp where its colour is measured, at the most
 BIN = 1.0  # [px] how far apart these are, at least
 STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
-OFF = 1.0  # [levels] of the colours between two stops from a straight line, at the most
 MOST_STOPS = 8
 
 Gradients = Sequence[Paint]
@@ -44,6 +45,10 @@ class Ramp:
     """Colours of the stops, shape (stop, channel)."""
     residual: float
     """Root mean square of the error over all channels [levels]."""
+
+    def is_better_than(self, flat: float) -> bool:
+        """Return whether it is worth its bytes beside a flat colour of mean squared error ``flat``."""
+        return self.residual * self.residual * prices.SHADED < flat * prices.REGION
 
 
 def fit_ramp(
@@ -85,7 +90,6 @@ def _sampled(mask: Bools) -> tuple[Ints, Ints]:
 def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
-    sure[:SPAN], sure[-SPAN:], sure[:, :SPAN], sure[:, -SPAN:] = False, False, False, False
     y, x = _sampled(sure)
     if len(y) < LEAST_SLOPES:  # as in thin bands
         return np.zeros((0, 2)), np.zeros((0, 2, 1))
@@ -175,7 +179,7 @@ def _fewest(knots: Floats, values: Floats) -> Floats:
         order = sorted(chosen)
         off = np.abs(interp(knots, knots[order], values[order]) - values).max(axis=1)
         worst = int(off.argmax())
-        if off[worst] <= OFF:
+        if off[worst] <= ROUNDING:
             break
         chosen.add(worst)
     return np.asarray(knots[sorted(chosen)])

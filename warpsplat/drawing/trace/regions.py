@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.assign import fill_gaps, with_main_color, without_orphans, without_specks
+from warpsplat.drawing.trace.assign import fill_gaps, without_specks
 from warpsplat.drawing.trace.bands import split_uneven
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, unchecked
-from warpsplat.drawing.trace.mixtures import MIXED, unmix
+from warpsplat.drawing.trace.grids import Floats, Ints, components, unchecked
 from warpsplat.drawing.trace.palette import Coloring, paint_parts
 from warpsplat.drawing.trace.ramps import Gradients
 from warpsplat.drawing.trace.seeds import find_seeds, noise_of
@@ -23,9 +21,6 @@ NEGLIGIBLE_NOISE = 0.5  # [levels] noise below which an image counts as clean
 MOST_NOISE = 12.0  # [levels] that tolerances take into account
 MOST_SEED_NOISE = 3.0  # [levels] that seeds take into account: they must stay apart
 SMOOTHED_STEP, SMOOTHED_NOISE = 12.0, 6.0  # [levels] steps that are smoothed, and per level of noise
-RELIABLE = 30  # [px] of the smallest seed that antialiasing cannot produce
-MIXED_SHARE = 0.7  # of a seed's pixels that are mixtures, from which on it is no seed
-WHOLE = 0.99  # share of one region from which on a pixel is no mixture
 
 
 @dataclass(frozen=True)
@@ -70,19 +65,15 @@ def find_regions(
         image = _smoothed(image, noise) if noise else image
     noise = min(noise, MOST_NOISE)
     check()
-    seeds = _without_mixed_seeds(image, find_seeds(image, min(noise, MOST_SEED_NOISE)), noise)
+    seeds = find_seeds(image, min(noise, MOST_SEED_NOISE))
     check()
     painted_parts = paint_parts(image, seeds, noise, gradients)
     parts = split_uneven(image, painted_parts, noise, check, gradients)
     check()
     parts = add_thin_parts(image, parts, noise)
     check()
-    parts = with_main_color(image, parts, noise)
     # From here on, pixels have the number of a colouring instead of a part.
-    painted, fills = fill_gaps(image, parts)
-    painted, fills = without_orphans(image, painted, fills, sure=parts.labels != NO_REGION)
-    painted, fills, given_up = without_specks(image, painted, fills, noise, price)
-    painted, fills = without_orphans(image, painted, fills, sure=~given_up)
+    painted, fills = without_specks(image, *fill_gaps(image, parts), noise, price)
     labels = components(painted, image)
     paint = np.zeros(int(labels.max()) + 1, np.int32)
     paint[labels] = painted
@@ -99,28 +90,3 @@ def _smoothed(image: Floats, noise: float) -> Floats:
                 part = filters.bilateral(part, 7, SMOOTHED_STEP + SMOOTHED_NOISE * noise, 2.5)
             smooth[..., channels] = part
     return smooth
-
-
-def _without_mixed_seeds(image: Floats, labels: Ints, noise: float) -> Ints:
-    """Return the labels of seeds without the small and thin ones that are mixtures of large ones."""
-    count = int(labels.max()) + 1
-    if count == 0:
-        return labels
-    sizes = np.bincount(labels[labels >= 0], minlength=count)
-    square, exact = np.ones((3, 3), np.uint8), labels.astype(np.float64)  # a type that OpenCV erodes
-    lowest, highest = (
-        operation(exact, square, borderType=cv2.BORDER_REPLICATE) for operation in (cv2.erode, cv2.dilate)
-    )
-    thin = np.ones(count, np.bool_)
-    thin[labels[(lowest == highest) & (labels >= 0)]] = False
-    doubtful = thin | (sizes < RELIABLE)
-    doubtful[sizes == sizes.max()] = False
-    in_doubt = (labels >= 0) & doubtful[labels]
-    rows, columns = np.nonzero(in_doubt)
-    if not len(rows):
-        return labels
-    others = np.where(in_doubt, NO_REGION, labels).astype(np.int32)
-    mixtures = unmix(image, others, image, rows, columns, noise)
-    mixed = (mixtures.residual <= MIXED + noise) & (mixtures.share < WHOLE)
-    dropped = doubtful & (np.bincount(labels[rows, columns], mixed, count) >= MIXED_SHARE * sizes)
-    return np.where(in_doubt & dropped[labels], NO_REGION, labels).astype(np.int32)

@@ -17,14 +17,18 @@ from warpsplat.drawing.trace.grids import (
 EDGE = 24  # [levels] step between neighbours that is an edge, whatever the noise
 NOISE_QUANTILE = 0.7  # of the steps beside edges, that measures the noise
 
-BEND_OF_NOISE, ROUNDING = 1.7, 0.6
+BEND_OF_NOISE, BEND_OF_ROUNDING = 1.7, 0.6
 """How much steps of noise differ over their size, and what rounding to levels adds to that [levels]."""
 
-FLAT_STEP = 1.0  # [levels] largest step between neighbours of a flat region, besides noise
+ROUNDING = 1.0
+"""How far pixels of one colour are off it, or one another, besides noise [levels]: more is seen."""
+
+OUTLIERS = 3.0
+"""How far outliers are off, over usual noise."""
+
 RAMP_STEP = 12.0  # [levels] largest step between neighbours on a ramp, besides noise; more is an edge
 RAMP_BEND = 2.0  # [levels] largest change of that step from one pixel to the next, besides noise
-LEAST_FLAT = 4  # [px] in a flat seed: a block of two by two
-LEAST_RAMP = 9  # [px] in a seed on a ramp: antialiasing looks like smaller ones
+LEAST_RAMP = 9  # [px] in a seed that is flat nowhere: antialiasing looks like smaller ones
 
 
 def noise_of(image: Floats) -> float:
@@ -54,7 +58,7 @@ def _noise_of_grey(grey: Floats) -> float:
     some = [np.sort(change[beside]) for change in (step, bend)]
     noise, bent = (float(values[int(NOISE_QUANTILE * (len(values) - 1))]) for values in some)
     # Steps that are all alike are a gradient, but for a level of rounding; those of noise differ as much.
-    return noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - ROUNDING, 0.0)
+    return noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - BEND_OF_ROUNDING, 0.0)
 
 
 def find_seeds(image: Floats, noise: float) -> Ints:
@@ -69,7 +73,7 @@ def find_seeds(image: Floats, noise: float) -> Ints:
     """
     right, below = np.diff(image, axis=1), np.diff(image, axis=0)
     step_right, step_below = channel_max(np.abs(right)), channel_max(np.abs(below))
-    flat_right, flat_below = step_right <= FLAT_STEP + noise, step_below <= FLAT_STEP + noise
+    flat_right, flat_below = step_right <= ROUNDING + noise, step_below <= ROUNDING + noise
     block = flat_right[1:] & flat_right[:-1] & flat_below[:, 1:] & flat_below[:, :-1]
     flat = np.zeros(image.shape[:2], np.bool_)
     for rows in (slice(None, -1), slice(1, None)):
@@ -97,7 +101,6 @@ def _without_tiny(parts: Ints, count: int, flat: Bools) -> Ints:
         return parts
     inside = parts >= 0
     sizes = np.bincount(parts[inside], minlength=count)
-    flat_sizes = np.bincount(parts[inside & flat], minlength=count)
-    keep = (sizes >= LEAST_RAMP) | (flat_sizes >= LEAST_FLAT)
+    keep = (sizes >= LEAST_RAMP) | (np.bincount(parts[flat], minlength=count) > 0)
     number = np.where(keep, np.cumsum(keep) - 1, NO_REGION).astype(np.int32)
     return np.where(inside, number[parts], NO_REGION)

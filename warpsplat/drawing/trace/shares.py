@@ -10,17 +10,12 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, nearest_in
 from warpsplat.drawing.trace.mixtures import DISTANCE_COST, mixed
 from warpsplat.drawing.trace.regions import Regions
+from warpsplat.drawing.trace.seeds import OUTLIERS, ROUNDING
 from warpsplat.portable import filters
 from warpsplat.scene.scene import numbers_in
 
 NEAR = 3.5
 """How far away the colourings lie that a pixel may be mixed of [px]."""
-
-ROUNDING = 1.0
-"""How far a pixel of one colour is off, besides noise [levels]; more tells where faint borders lie."""
-
-DOUBT = 3.0
-"""How far off a share may be, over what its residual and noise make it: outliers are three times as far."""
 
 PURE = 0.02
 """Share of another colouring up to which a pixel is not mixed."""
@@ -102,7 +97,7 @@ def find_shares(regions: Regions) -> Shares:
     rows, columns = np.nonzero(off > ROUNDING + regions.noise)
     pairs = _best_pairs(regions, painted, colors, rows, columns)
     swapped = pairs.share < 0.5
-    doubt = DOUBT * (pairs.residual + regions.noise) / np.maximum(pairs.contrast, 1)
+    doubt = OUTLIERS * (pairs.residual + regions.noise) / np.maximum(pairs.contrast, 1)
     found = (
         (painted, np.where(swapped, pairs.second, pairs.first)),
         (painted, np.where(swapped, pairs.first, pairs.second)),
