@@ -13,11 +13,12 @@ from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.glyphs import find_glyphs
+from warpsplat.drawing.optics import without_optics
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
 from warpsplat.errors import counted
-from warpsplat.fit.export import finished
+from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
@@ -55,7 +56,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         made = _drawn_with_sheet(picture, settings, run, sheet, rest, most)
         if made and (not limit or _size(made, settings) <= limit):
             return made
-    traced = trace_regions(picture.pixels, picture.noise, settings, run, most)
+    picture, traced = _sharp(picture, settings, run, most)
     if not run.over():
         announce_fit(len(traced.joints) // 3, picture, settings)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
@@ -80,6 +81,20 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     if not limit or first.size <= limit:
         return first.fit
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
+
+
+def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, Drawing]:
+    """Return a picture as it was before it was blurred or sharpened, and its trace."""
+
+    def trace(pixels: FloatArray) -> Drawing:
+        return trace_regions(pixels, picture.noise, settings, run, most)
+
+    def show(drawing: Drawing) -> FloatArray:
+        text = finished(drawing.scene, settings, DRAFT_GRID)
+        return shown_image(text, drawing.scene, picture.pixels.shape[2])
+
+    pixels, traced = without_optics(picture.pixels, trace, show, run.over)
+    return replace(picture, pixels=pixels), traced
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
