@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -50,13 +50,13 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     most = None if settings.simplify else settings.curves
     picture = Picture.of(problem.target)
     announce_trace(picture, settings)
-    is_thin = any(margins(picture.pixels, THIN_SIDE))
-    sheet, rest = (None, picture.pixels) if is_thin else find_glyphs(picture.pixels)
-    if sheet:
-        made = _drawn_with_sheet(picture, settings, run, sheet, rest, most)
-        if made and (not limit or _size(made, settings) <= limit):
+    picture, found = _sharp(picture, settings, run, most)
+    if found.sheet:
+        made = _drawn_with_sheet(picture, settings, run, found)
+        if not limit or _size(made, settings) <= limit:
             return made
-    picture, traced = _sharp(picture, settings, run, most)
+        found = _traced(picture.pixels, picture.noise, settings, run, most, has_sheet=False)
+    traced = found.drawing
     if not run.over():
         announce_fit(len(traced.joints) // 3, picture, settings)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
@@ -83,18 +83,53 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
 
 
-def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, Drawing]:
+@dataclass(frozen=True)
+class _Trace:
+    """A traced picture: its glyphs, and the rest of it."""
+
+    drawing: Drawing
+    """Of the rest."""
+    rest: FloatArray
+    """The picture without glyphs."""
+    scene: Scene
+    """All of it."""
+    sheet: Sheet | None = None
+    glyphs: Drawing | None = None
+
+
+def _traced(
+    pixels: FloatArray,
+    noise: float | None,
+    settings: Settings,
+    run: Run,
+    most: int | None,
+    *,
+    has_sheet: bool = True,
+) -> _Trace:
+    """Trace an image; its glyphs on a sheet, if it has some and may have (``has_sheet``)."""
+    sheet, rest = find_glyphs(pixels) if has_sheet else (None, pixels)
+    if sheet:
+        glyphs, others = sheet.trace(), trace_regions(rest, noise, settings, run, None)
+        scene = sheet.placed(glyphs.scene, others.scene)
+        if most is None or len(scene) <= most:
+            return _Trace(others, rest, scene, sheet, Drawing(glyphs.scene, glyphs.joints))
+    drawing = trace_regions(pixels, noise, settings, run, most)
+    return _Trace(drawing, pixels, drawing.scene)
+
+
+def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, _Trace]:
     """Return a picture as it was before it was blurred or sharpened, and its trace."""
+    has_sheet = not any(margins(picture.pixels, THIN_SIDE))
 
-    def trace(pixels: FloatArray) -> Drawing:
-        return trace_regions(pixels, picture.noise, settings, run, most)
+    def trace(pixels: FloatArray) -> _Trace:
+        return _traced(pixels, picture.noise, settings, run, most, has_sheet=has_sheet)
 
-    def show(drawing: Drawing) -> FloatArray:
-        text = finished(drawing.scene, settings, DRAFT_GRID)
-        return shown_image(text, drawing.scene, picture.pixels.shape[2])
+    def show(found: _Trace) -> FloatArray:
+        text = finished(found.scene, settings, DRAFT_GRID)
+        return shown_image(text, found.scene, picture.pixels.shape[2])
 
-    pixels, traced = without_optics(picture.pixels, trace, show, run.over)
-    return replace(picture, pixels=pixels), traced
+    pixels, found = without_optics(picture.pixels, trace, show, run.over)
+    return replace(picture, pixels=pixels), found
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
@@ -110,18 +145,12 @@ def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, 
     return finish_by_lightness(target, drawing, run, **(usual | options))
 
 
-def _drawn_with_sheet(
-    picture: Picture, settings: Settings, run: Run, sheet: Sheet, rest: FloatArray, most: int | None
-) -> Fit | None:
-    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes.
-
-    Return None if these are more paths than ``most``.
-    """
-    found, others = sheet.trace(), trace_regions(rest, picture.noise, settings, run, None)
-    if most is not None and len(sheet.placed(found.scene, others.scene)) > most:
-        return None
+def _drawn_with_sheet(picture: Picture, settings: Settings, run: Run, found: _Trace) -> Fit:
+    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes."""
+    sheet, glyphs, others, rest = found.sheet, found.glyphs, found.drawing, found.rest
+    assert sheet and glyphs
     copies = len(sheet.copies) / len(sheet.corners)
-    parts = [(Drawing(found.scene, found.joints), sheet.image, copies), (others, rest, 1.0)]
+    parts = [(glyphs, sheet.image, copies), (others, rest, 1.0)]
     nodes = [len(drawing.joints) / 3 * times for drawing, _, times in parts]
     if not run.over():
         announce_fit(sum(len(drawing.joints) for drawing, *_ in parts) // 3, picture, settings)

@@ -36,8 +36,8 @@ RINGS = [
 """Places of a kernel (row, column) that have one weight, as it is symmetric to the axes and diagonals."""
 
 LIGHTNESS = np.array([5, 9, 2], np.float32)
-"""Shares of the channels, about, in what JPEG keeps at full resolution (ITU-T T.871). Whole numbers, small enough
-for exact sums over an image."""
+"""Shares of the channels, about, in what JPEG keeps at full resolution (ITU-T T.871): whole numbers, small
+enough for exact sums over an image."""
 
 Traced = TypeVar("Traced")
 
@@ -57,7 +57,7 @@ class Optics:
 
 
 def find_optics(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
-    """Return the kernel with which one image is nearest to another, and the squared errors with it and without.
+    """Return the kernel that brings one image nearest to another, and the squared errors with and without it.
 
     Args:
         sharp: Whole levels, shape (height, width, channel).
@@ -94,19 +94,23 @@ def without_optics(
         show: Renders a trace, likewise.
         over: Returns whether there is no time left.
     """
-    seen, traced, least = _levels(pixels), trace(pixels), np.inf
+    seen, first, least = _levels(pixels), (pixels, trace(pixels)), np.inf
+    current, traced = first
     for _ in range(TURNS):
         if over():
             break
         sharp = _levels(show(traced))
         optics, error, without = find_optics(sharp, seen)
-        if error > CLEARLY * without or error >= least:
+        if error >= CLEARLY * without:
+            return first  # it was the trace that was soft
+        if error >= least:
             break
         least, levels = error, np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
-        pixels = np.minimum(levels, levels[..., 3:]) if levels.shape[2] == 4 else levels
-        pixels = (pixels / np.float32(255)).astype(np.float32)
-        traced = trace(pixels)
-    return pixels, traced
+        if levels.shape[2] == 4:
+            levels = np.minimum(levels, levels[..., 3:])
+        current = np.asarray(levels / np.float32(255), np.float32)
+        traced = trace(current)
+    return current, traced
 
 
 def _levels(pixels: FloatArray) -> Floats:
