@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats
+from warpsplat.portable.linear import solve
 from warpsplat.scene import FloatArray
 
 RADIUS = 2
@@ -63,7 +64,7 @@ def find_optics(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
         sharp: Whole levels, shape (height, width, channel).
         seen: Likewise; only the lightness of both counts.
     """
-    sharp, seen = ((image[..., :3] @ LIGHTNESS)[..., None] for image in (sharp, seen))
+    sharp, seen = ((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
     center, *rings = _rings(sharp)
     columns = [ring - len(places) * center for ring, places in zip(rings, RINGS[1:], strict=True)]
     inside = np.any([column != 0 for column in columns], axis=0)
@@ -72,12 +73,12 @@ def find_optics(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
     products = np.array([[(one * other).sum() for one in table] for other in table])
     normal, right, without = products[:-1, :-1], products[:-1, -1], float(products[-1, -1])
     try:
-        weights = np.round(np.linalg.solve(normal, right), 4)  # the same on all processors
+        weights = solve(normal, right)
     except np.linalg.LinAlgError:  # no edges, or all alike
         return Optics((1.0, *(0.0,) * len(columns))), without, without
-    error = without - 2 * weights @ right + weights @ normal @ weights
+    error = without - float((weights * right).sum())
     beside = sum(len(places) * weight for places, weight in zip(RINGS[1:], weights.tolist(), strict=True))
-    return Optics((1 - beside, *weights.tolist())), float(error), without
+    return Optics((1 - beside, *weights.tolist())), error, without
 
 
 def without_optics(
