@@ -55,7 +55,7 @@ NOT_IN_STEPS = {
     *("tiles_to_pixels", "pixels_to_tiles"),
     *("opaque_backward", "opaque_paint_backward", "straight_forward", "straight_backward"),
     *("straight_paint_forward", "straight_paint_backward"),
-    *("along", "crossings", "curvature", "errors", "flatten", "nearest", "slopes", "solve"),
+    *("along", "crossings", "derivatives", "flatten", "nearest", "solve"),
 }
 """Kernels that run between steps, in passes of ``warpsplat.torch``, or for drawings, on the host."""
 

@@ -203,7 +203,7 @@ def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:
         with failures_of(run.backend.device):
             return strategy.make(problem, run)
     except DeviceError as failure:
-        made = STRATEGIES["draft"].make(problem, run)
+        made = STRATEGIES["draft"].make(problem.having(tidy=False), run)
         run.failures.append(failure)
         return replace(made, interrupted=True)
 

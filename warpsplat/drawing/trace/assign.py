@@ -6,9 +6,11 @@ The functions take and return ``painted``, the number of each pixel's colouring,
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, nearest_in
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max, components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
 from warpsplat.drawing.trace.palette import Parts, least_worth
 
@@ -16,6 +18,32 @@ SMALL = 60  # [px] of the largest region that may be given up
 
 REACHES = REACH, REACH, REACH, 2 * REACH
 """How far away the regions may lie that it is mixed of, in turn [px]: the tips of stars are long."""
+
+
+def with_main_color(image: Floats, parts: Parts, noise: float) -> Parts:
+    """Give the main flat colour to the unlabelled pixels that are mostly of it, however far its parts are.
+
+    Between dense lines no pixel is free of them: paper that has no seed near it would be taken for ink. Only
+    pixels that no mixture of what is near explains are looked at.
+    """
+    known = parts.labels != NO_REGION
+    is_flat = np.array([coloring.ramp is None for coloring in parts.colorings], np.bool_)[parts.paint]
+    sizes = np.bincount(parts.labels[known], minlength=len(parts.paint)) * is_flat
+    if not sizes.any():
+        return parts
+    # Of the colouring that covers most, which may be in many parts, the largest.
+    main = int((sizes * (parts.paint == np.bincount(parts.paint, sizes).argmax())).argmax())
+    color = parts.colorings[parts.paint[main]].color
+    rows, columns = np.nonzero(~known)
+    mixtures = unmix(image, parts.labels, parts.fills, rows, columns, noise)
+    away, toward = image[rows, columns] - color, mixtures.base - color
+    share = (away * toward).sum(axis=1) / np.maximum((toward**2).sum(axis=1), 1e-6)  # of what is near
+    off = channel_max(np.abs(away - share[:, None] * toward))
+    own = (mixtures.residual > MIXED + noise) & (share < 0.5) & (off <= MIXED + noise)
+    labels, fills = parts.labels.copy(), parts.fills.copy()
+    labels[rows[own], columns[own]] = main
+    fills[rows[own], columns[own]] = color
+    return replace(parts, labels=labels, fills=fills)
 
 
 def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
