@@ -10,26 +10,6 @@ NO_ROW = wp.constant(-1)
 
 
 @wp.func
-def tile_row(
-    slot: wp.int32,
-    slot_shape: wp.array[wp.int32],
-    slot_first: wp.array[wp.int32],
-    shape_tiles: wp.array2d[wp.int32],
-) -> wp.vec4i:
-    """Return (shape, leftmost tile, width [tiles], tile's y) of the row that starts at ``slot``; the shape is
-    NO_ROW where none does.
-    """
-    shape = slot_shape[slot]
-    if shape < 0:
-        return wp.vec4i(NO_ROW, 0, 0, 0)
-    wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-    local = slot - slot_first[shape]
-    if local % wide != 0:
-        return wp.vec4i(NO_ROW, 0, 0, 0)
-    return wp.vec4i(shape, shape_tiles[shape, 0], wide, shape_tiles[shape, 1] + local / wide)
-
-
-@wp.func
 def one_tile(
     slot: wp.int32,
     slot_shape: wp.array[wp.int32],
@@ -45,6 +25,26 @@ def one_tile(
     wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
     local = slot - slot_first[shape]
     return wp.vec4i(shape, shape_tiles[shape, 0] + local % wide, 1, shape_tiles[shape, 1] + local / wide)
+
+
+@wp.func
+def tile_row(
+    slot: wp.int32,
+    slot_shape: wp.array[wp.int32],
+    slot_first: wp.array[wp.int32],
+    shape_tiles: wp.array2d[wp.int32],
+) -> wp.vec4i:
+    """Return (shape, leftmost tile, width [tiles], tile's y) of the row that starts at ``slot``; the shape is
+    NO_ROW where none does.
+    """
+    tile = one_tile(slot, slot_shape, slot_first, shape_tiles)
+    shape = tile[0]
+    if shape < 0:
+        return tile
+    left = shape_tiles[shape, 0]
+    if tile[1] != left:
+        return wp.vec4i(NO_ROW, 0, 0, 0)
+    return wp.vec4i(shape, left, shape_tiles[shape, 2] - left, tile[3])
 
 
 @wp.func

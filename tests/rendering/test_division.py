@@ -11,6 +11,7 @@ import pytest
 
 from tests.helpers import SPLAT, adjoint, relative_error, renderer_for
 from tests.scenes import CURVES, mixed_scene, random_scene, styled_scene, with_gradients
+from warpsplat.rendering import backend
 from warpsplat.rendering.backend import GPU_LANES, Backend
 from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.renderer import Capacity, render
@@ -95,3 +96,11 @@ def test_the_adjoint_of_opaque_shapes_is_the_usual_one_of_translucent_shapes(
     usual, found = (adjoint(renderer_for(scene, device, opaque=opaque), 0.7) for opaque in (False, True))
     for name, gradient in found.items():
         assert relative_error(gradient, usual[name]) < 1e-4, name
+
+
+@pytest.mark.parametrize(("cores", "asked", "threads"), [(3, None, 3), (64, None, 8), (64, 32, 32)])
+def test_many_cores_are_used_only_if_asked_for(
+    cores: int, asked: int | None, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backend, "available_cores", lambda: cores)
+    assert Backend.on("cpu", asked).threads == threads

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpsplat.drawing.trace.assign import with_main_color
 from warpsplat.drawing.trace.colors import with_best_colors
-from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.grids import NO_REGION
+from warpsplat.drawing.trace.palette import Coloring, Parts
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions
 
@@ -40,3 +42,17 @@ def test_ink_has_the_colour_of_its_pixels() -> None:
 def test_a_colour_that_pixels_show_stays() -> None:
     assert colors_of(stroke(60, 60)) == [255, 60]
     assert colors_of(stroke(60, 61)) == [255, 60], "rounding"
+
+
+def test_the_main_colour_is_that_of_most_area_in_all_its_parts() -> None:
+    """White in three parts, together larger than the one of ink, and a white pixel that is not labelled."""
+    labels = np.zeros((9, 22), np.int32)
+    labels[:, 10:] = np.repeat([1, 2, 3], 4)
+    colorings = [Coloring(grey(0)), Coloring(WHITE)]
+    paint = np.array([0, 1, 1, 1], np.int32)
+    labels[4, 4] = NO_REGION
+    fills = np.array([coloring.color for coloring in colorings])[paint[labels]]
+    image = fills.copy()
+    image[4, 4] = WHITE
+    found = with_main_color(image, Parts(labels, fills, paint, colorings), 0.0)
+    assert found.labels[4, 4] in (1, 2, 3)
