@@ -16,7 +16,6 @@ LEAST_RAMP, LEAST_NOISY_RAMP = 30, 400  # [px] of a part with a ramp, without an
 UNEVEN = 1.6  # [levels] residual of a flat colour from which on a ramp is tried, besides noise
 UNEVEN_NOISE = 3.0  # what a level of noise adds to that
 SAME = 1.5  # [levels] colours that differ by less are one
-SAME_NOISE, SAME_NOISE_MOST = 6.0, 24.0  # what a level of noise adds to that, and what it adds at the most
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,8 @@ def paint_parts(image: Floats, labels: Ints, noise: float, gradients: Gradients 
             paint[part] = len(colorings)
             colorings.append(Coloring(means[part], ramp))
     is_flat = paint == NO_REGION
-    shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[is_flat], sizes[is_flat], noise)
+    least = least_worth(count, labels.size, noise)
+    shared, flat_colorings = _shared_colors((modes if noise == 0 else means)[is_flat], sizes[is_flat], least)
     paint[is_flat] = len(colorings) + shared
     colorings += flat_colorings
     colors = np.array([coloring.color for coloring in colorings], np.float32)[paint]
@@ -111,10 +111,12 @@ def _modes(pixels: Floats, owners: Ints, count: int) -> Floats:
     return colors
 
 
-def _shared_colors(colors: Floats, sizes: Ints, noise: float) -> tuple[Ints, list[Coloring]]:
-    """Return the number of the colour that each flat part has, and these: those of the largest parts."""
+def _shared_colors(colors: Floats, sizes: Ints, least: float) -> tuple[Ints, list[Coloring]]:
+    """Return the number of the colour that each flat part has, and these: those of the largest parts.
+
+    ``least``: as ``least_worth``: what a colour of its own must save.
+    """
     known = np.zeros((0, colors.shape[1]))
-    tolerance = SAME + min(SAME_NOISE * noise, SAME_NOISE_MOST)
     numbers = np.zeros(len(colors), np.intp)
     for part in np.argsort(-sizes, kind="stable").tolist():
         color = colors[part]
@@ -122,9 +124,9 @@ def _shared_colors(colors: Floats, sizes: Ints, noise: float) -> tuple[Ints, lis
             color = np.zeros_like(color)
         elif color[3] > 255 - CLEAR:
             color = np.append(color[:3], 255.0)
-        off = np.abs(known - color).max(axis=1) if len(known) else np.array([np.inf])
+        off = np.square(known - color).sum(axis=1) if len(known) else np.array([np.inf])
         nearest = int(off.argmin())
-        if off[nearest] > tolerance:
+        if off[nearest] > SAME * SAME and off[nearest] * sizes[part] > least:
             nearest = len(known)
             known = np.concatenate([known, color[None]])
         numbers[part] = nearest
