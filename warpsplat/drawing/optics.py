@@ -25,9 +25,9 @@ RADIUS = 2
 TURNS = 6
 """Traces from which it is found, at the most."""
 
-CLEARLY = 0.75
-"""Share of the squared error without a kernel that one must leave less than. Clean drawings have .9 and more,
-blurred ones .5 and less."""
+LIKELY, CLEARLY = 0.9, 0.75
+"""Share of the squared error without a kernel that one must leave less than for a trace through it to be
+tried, and for that to be kept: blurred pictures have .5 and less."""
 
 RINGS = [
     sorted({(up * y, left * x) for y, x in ((a, b), (b, a)) for up in (1, -1) for left in (1, -1)})
@@ -95,23 +95,29 @@ def without_optics(
         show: Renders a trace, likewise.
         over: Returns whether there is no time left.
     """
-    seen, first, least = _levels(pixels), (pixels, trace(pixels)), np.inf
+    seen = _levels(pixels)
+    first = best = pixels, trace(pixels)
     current, traced = first
-    for _ in range(TURNS):
-        if over():
-            break
+    bound = least = np.inf
+    for turn in range(TURNS):
         sharp = _levels(show(traced))
         optics, error, without = find_optics(sharp, seen)
-        if error >= CLEARLY * without:
-            return first  # it was the trace that was soft
-        if error >= least:
+        if turn == 0:
+            if error >= LIKELY * without:
+                return first
+            bound = CLEARLY * without
+        elif error >= least:
             break
-        least, levels = error, np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
+        else:
+            least, best = error, (current, traced)
+        if over():
+            break
+        levels = np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
         if levels.shape[2] == 4:
             levels = np.minimum(levels, levels[..., 3:])
         current = np.asarray(levels / np.float32(255), np.float32)
         traced = trace(current)
-    return current, traced
+    return best if least < bound else first
 
 
 def _levels(pixels: FloatArray) -> Floats:
