@@ -18,16 +18,19 @@ CHROMA_WEIGHT = 0.25
 """Weight of what is blurred: some, as colours may be of one lightness."""
 
 
-def finish_by_lightness(target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
+def finish_by_lightness(
+    target: FloatArray, drawing: Drawing, run: Run, *, seen: FloatArray | None = None, **options: Any
+) -> Finished:
     """Finish a drawing as ``finish_drawing``, mostly by lightness where the image's colours are blurred.
 
     Its PSNR is NaN then.
     """
     if not has_blurred_colors(target):
-        return finish_drawing(target, drawing, run, **options)
+        return finish_drawing(target, drawing, run, seen=seen, **options)
     scene, ground = drawing.scene, drawing.scene.canvas.background
     canvas = replace(scene.canvas, background=None if ground is None else _dull(ground))
     dull = replace(scene, colors=_dull(scene.colors), stop_colors=_dull(scene.stop_colors), canvas=canvas)
+    options["seen"] = None if seen is None else _dull(seen)
     done = finish_drawing(_dull(target), replace(drawing, scene=dull), run, **options)
     own = {name: getattr(scene, name) for name in ("colors", "stop_colors", "canvas")}
     return done._replace(drawing=replace(done.drawing, scene=replace(done.drawing.scene, **own)), psnr=np.nan)

@@ -61,7 +61,8 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
         announce_fit(len(traced.joints) // 3, picture, settings)
     run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
     parts = run.open_parts(share=0.5 if limit else 1.0)
-    finish = partial(_finish, settings, picture.pixels, negligible=LEAST_ERROR * picture.drawn_share)
+    negligible = LEAST_ERROR * picture.drawn_share
+    finish = partial(_finish, settings, picture.pixels, negligible=negligible, seen=picture.seen)
 
     def sketch_of(done: Finished, most: int | None) -> Sketch:
         sketch = _sketch(problem, picture, run, done)
@@ -129,7 +130,8 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
         return shown_image(text, found.scene, picture.pixels.shape[2])
 
     pixels, found = without_optics(picture.pixels, trace, show, run.over)
-    return replace(picture, pixels=pixels), found
+    seen = None if pixels is picture.pixels else picture.pixels
+    return replace(picture, pixels=pixels, seen=seen), found
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:

@@ -57,14 +57,41 @@ class Optics:
         return total
 
 
-def find_optics(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
-    """Return the kernel that brings one image nearest to another, and the squared errors with and without it.
+@dataclass(frozen=True)
+class Found:
+    """The optics that bring a sharp image nearest to a picture."""
+
+    optics: Optics
+    error: float
+    """Sum of squared errors with them, in whole levels of lightness."""
+    without: float
+    """The same without."""
+    undone: FloatArray
+    """The picture without them."""
+
+
+def find_optics(sharp: FloatArray, seen: FloatArray) -> Found:
+    """Return the optics that bring a sharp image nearest to a picture, and the picture without them.
 
     Args:
-        sharp: Whole levels, shape (height, width, channel).
+        sharp: sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity, (height, width, 4).
         seen: Likewise; only the lightness of both counts.
     """
-    sharp, seen = ((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
+    sharp, seen = _levels(sharp), _levels(seen)
+    optics, error, without = _nearest(
+        *((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
+    )
+    undone = np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
+    if undone.shape[2] == 4:
+        undone = np.minimum(undone, undone[..., 3:])
+    return Found(optics, error, without, np.asarray(undone / np.float32(255), np.float32))
+
+
+def _nearest(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
+    """Return the optics that bring an image nearest to another, and the squared errors with and without.
+
+    Both are of one channel, in whole levels.
+    """
     center, *rings = _rings(sharp)
     columns = [ring - len(places) * center for ring, places in zip(rings, RINGS[1:], strict=True)]
     inside = np.any([column != 0 for column in columns], axis=0)
@@ -94,28 +121,26 @@ def without_optics(
         trace: Traces such pixels.
         show: Renders a trace, likewise.
         over: Returns whether there is no time left.
+
+    Returns:
+        ``pixels`` itself if no optics explain it clearly better than its trace does.
     """
-    seen = _levels(pixels)
     first = best = pixels, trace(pixels)
     current, traced = first
     bound = least = np.inf
     for turn in range(TURNS):
-        sharp = _levels(show(traced))
-        optics, error, without = find_optics(sharp, seen)
+        found = find_optics(show(traced), pixels)
         if turn == 0:
-            if error >= LIKELY * without:
+            if found.error >= LIKELY * found.without:
                 return first
-            bound = CLEARLY * without
-        elif error >= least:
+            bound = CLEARLY * found.without
+        elif found.error >= least:
             break
         else:
-            least, best = error, (current, traced)
+            least, best = found.error, (current, traced)
         if over():
             break
-        levels = np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
-        if levels.shape[2] == 4:
-            levels = np.minimum(levels, levels[..., 3:])
-        current = np.asarray(levels / np.float32(255), np.float32)
+        current = found.undone
         traced = trace(current)
     return best if least < bound else first
 

@@ -40,6 +40,9 @@ class Picture:
     drawn_size: npt.NDArray[np.intp]
     """Width and height of what is drawn [px]."""
 
+    seen: FloatArray | None = None
+    """The pixels before they were made sharp, if they were."""
+
     @classmethod
     def of(cls, image: FloatArray) -> Picture:
         """Return the picture of an image."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,10 +16,12 @@ from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import apart, applied, candidates
+from warpsplat.drawing.optics import find_optics
 from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.shapes import shape_changes
 from warpsplat.fit.problem import Run
 from warpsplat.metrics import decibels
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.svg.primitives import held_rounds
 from warpsplat.svg.sizes import estimated_size
@@ -32,6 +35,9 @@ FIRST_ROAM, SECOND_ROAM, ROAM_PIXELS = 100, 50, 16_000_000
 
 FAR = 4
 """Steps at the beginning of the first two that look farther than to the next pixel's border."""
+
+TURNS = 2
+"""Fits through optics after each of the first two: each halves what is left of them, about."""
 
 RECOVERED = 10.0
 """Largest error of an edit before refitting, over the largest one after: refitting recovers most of it, and
@@ -52,6 +58,7 @@ def finish_drawing(
     symbols: bool = False,
     grid: float | None = None,
     negligible: float = LEAST_ERROR,
+    seen: FloatArray | None = None,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -66,6 +73,8 @@ def finish_drawing(
         symbols: whether nearly equal outlines become equal.
         grid: view box units per pixel; None: those that cost least.
         negligible: mean squared error below which differences do not count.
+        seen: the image before it was made sharp, if ``target`` was: the drawing is fitted so that it is like
+            that through the optics, of which both tell more and more. The PSNR is NaN then.
     """
     target = matching(target, drawing.scene.canvas)
     if run.over() or not len(drawing.scene):
@@ -75,10 +84,12 @@ def finish_drawing(
     fit = OutlineFit(target, drawing, run)
     fit.advance(parts[0], FIRST_STEPS, FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
+    fit, target = _through_optics(fit, target, parts[0], seen)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, byte, run.over), run, fit.capacity)
         fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
+        fit, target = _through_optics(fit, target, parts[1], seen)
     equal: list[Equal] = []
     if tidy and not run.over():
         exact, worth_of_byte = fit.drawing, byte(fit.error, estimated_size(fit.drawing.scene, DRAFT_GRID))
@@ -89,8 +100,9 @@ def finish_drawing(
             exact, equal = with_equal_outlines(target, exact, run, worth_of_byte)
         if shapes or equal:
             fit = OutlineFit(target, exact, run, fit.capacity)
+    psnr = decibels(fit.error * 255**2) if seen is None else math.nan
     if run.over():
-        return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), decibels(fit.error * 255**2))
+        return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), psnr)
     grid = grid or drawing_grid(fit, finest, byte)
     low, held = on_grid(rounded(fit.drawing.scene, grid), equal, grid)
     held |= held_rounds(low, grid)
@@ -99,7 +111,25 @@ def finish_drawing(
     fit.advance(parts[2], THIRD_STEPS)
     drawing = fit.drawing
     low, _ = on_grid(rounded(drawing.scene, grid), equal, grid)
-    return Finished(replace(drawing, scene=low), grid, decibels(fit.error * 255**2))
+    psnr = decibels(fit.error * 255**2) if seen is None else math.nan
+    return Finished(replace(drawing, scene=low), grid, psnr)
+
+
+def _through_optics(
+    fit: OutlineFit, target: FloatArray, run: Run, seen: FloatArray | None
+) -> tuple[OutlineFit, FloatArray]:
+    """Return a fit to what the optics leave of an image, and that, by what the fit shows."""
+    for _ in range(TURNS if seen is not None else 0):
+        if run.over():
+            break
+        drawing = fit.drawing
+        assert seen is not None
+        target = find_optics(
+            render(drawing.scene, backend=run.backend), matching(seen, drawing.scene.canvas)
+        ).undone
+        fit = OutlineFit(target, drawing, run, fit.capacity)
+        fit.advance(run, SECOND_STEPS)
+    return fit, target
 
 
 def _roam(fit: OutlineFit, target: FloatArray, run: Run, steps: int, negligible: float) -> None:
