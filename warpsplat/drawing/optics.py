@@ -126,23 +126,22 @@ def without_optics(
         ``pixels`` itself if no optics explain it clearly better than its trace does.
     """
     first = best = pixels, trace(pixels)
-    current, traced = first
-    bound = least = np.inf
+    bound, (current, traced) = np.inf, first
     for turn in range(TURNS):
         found = find_optics(show(traced), pixels)
         if turn == 0:
             if found.error >= LIKELY * found.without:
-                return first
+                break
             bound = CLEARLY * found.without
-        elif found.error >= least:
+        elif found.error >= bound:
             break
         else:
-            least, best = found.error, (current, traced)
+            bound, best = found.error, (current, traced)
         if over():
             break
         current = found.undone
         traced = trace(current)
-    return best if least < bound else first
+    return best
 
 
 def _levels(pixels: FloatArray) -> Floats:
