@@ -50,9 +50,7 @@ class Sheet:
         levels = np.asarray(self.image, np.float32) * 255
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
         painted = (levels[..., 0] < 128).astype(np.int32)
-        labels = components(painted, levels)
-        paint = np.zeros(int(labels.max()) + 1, np.int32)
-        paint[labels] = painted
+        labels, paint = components(painted, levels)
         colors = np.array([[255, 255, 255, 255], [0, 0, 0, 255]], np.float64)
         fills = colors.astype(np.float32)[painted]
         regions = Regions(levels, labels, fills, paint, [Coloring(color) for color in colors], 0.0)

@@ -41,7 +41,7 @@ def test_loops_go_round_their_regions() -> None:
 
 
 def test_each_crack_ends_where_the_next_begins() -> None:
-    labels = components(
+    labels, _ = components(
         np.random.default_rng(0).integers(0, 3, (20, 20)).astype(np.int32), np.zeros((20, 20, 4))
     )
     loops = find_loops(labels, np.zeros((20, 20, 4), np.float32))
@@ -54,7 +54,7 @@ def test_each_crack_ends_where_the_next_begins() -> None:
 
 
 def test_loops_of_chosen_regions_are_among_all() -> None:
-    labels = components(
+    labels, _ = components(
         np.random.default_rng(1).integers(0, 3, (20, 20)).astype(np.int32), np.zeros((20, 20, 4))
     )
     image, chosen = grey(labels), np.arange(labels.max() + 1) % 3 == 1
@@ -76,7 +76,7 @@ def test_a_diagonal_line_is_connected(dark: bool) -> None:
     painted = np.zeros((12, 12), np.int32)
     painted[np.arange(12), np.arange(12)] = 1
     image = np.repeat(np.where((painted == 1) == dark, 0, 200)[..., None], 4, axis=2).astype(np.float32)
-    labels = components(painted, image)
+    labels, _ = components(painted, image)
     assert len(np.unique(labels[painted == 1])) == 1
     loops = find_loops(labels, image)
     assert sorted(loops.region[~loops.is_hole].tolist()) == [0, 1, 2]

@@ -109,9 +109,7 @@ def test_regions_of_random_maps_keep_the_areas_of_each_pixel(seed: int) -> None:
         [[255, 255, 255, 255], [200, 30, 20, 255], [20, 30, 120, 255], [0, 0, 0, 255]], np.float32
     )
     image = palette[painted]
-    labels = components(painted, image)
-    paint = np.zeros(labels.max() + 1, np.int32)
-    paint[labels] = painted
+    labels, paint = components(painted, image)
     regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
     found = find_partition(regions)
     shown = found.paint[found.labels].reshape(height, found.scale, width, found.scale)

@@ -88,19 +88,6 @@ def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         trace_pixels(enlarged(noise(16, 3), 2))
 
 
-@pytest.mark.parametrize("most", [4, 12, 60])
-def test_a_colour_of_many_corners_has_several_shapes(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    image = np.random.default_rng(4).integers(0, 2, (12, 15, 1)).repeat(3, axis=2).astype(np.float32)
-    whole, _ = trace_pixels(image)
-    monkeypatch.setattr(pixels, "MOST_CORNERS", most)
-    scene, per_pixel = trace_pixels(image)
-    assert len(whole) == 1
-    assert len(scene) > 1
-    assert (scene.point_counts() <= 3 * most).all()
-    shown = np.asarray(render_svg(write_svg(scene, per_pixel=per_pixel)).convert("RGB"))
-    assert (shown == np.round(255 * image)).all()
-
-
 def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:
     image = np.concatenate([noise(12, 3), np.ones((12, 12, 1), np.float32)], axis=2)
     scene, per_pixel = trace_pixels(image)

@@ -165,9 +165,7 @@ def test_regions_of_single_pixels_are_traced() -> None:
     palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 200, 255]], np.float32)
     painted = np.random.default_rng(0).integers(0, 3, (4, 4)).astype(np.int32)
     image = palette[painted]
-    labels = components(painted, image)
-    paint = np.zeros(labels.max() + 1, np.int32)
-    paint[labels] = painted
+    labels, paint = components(painted, image)
     regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
     with np.errstate(all="raise"):
         traced = trace_partition(find_partition(regions))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -10,20 +9,17 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing import prices
-from warpsplat.drawing.prices import LEAST_ERROR, worth
+from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.trace.grids import Bools, Floats, bounding_boxes, unchecked
 from warpsplat.drawing.trace.palette import UNEVEN, Coloring, Parts
-from warpsplat.drawing.trace.ramps import Gradients, fit_ramp
+from warpsplat.drawing.trace.ramps import BLUR, Gradients, fit_ramp
 from warpsplat.drawing.trace.seeds import ROUNDING
 from warpsplat.portable import filters
 from warpsplat.portable.linear import product
 from warpsplat.scene.attributes import GRADIENTS
 
 LEAST_BAND = 30  # [px] of a band; smaller pieces stay with what surrounds them
-MOST_BANDS = 256  # of an image
-SOFT = 1.5  # [px] standard deviation of the blur before a part is cut, so that noise does not fray the bands
-POWERS = 8  # steps of the power iteration
-TONES = 64  # levels of tone among which a part is cut in two
+MOST_BANDS = 128  # of an image
 
 
 @dataclass(frozen=True)
@@ -70,31 +66,35 @@ def split_uneven(
     if not roots:
         return parts
     rest = image.size * (255**2 * LEAST_ERROR + noise**2)
-    others = prices.REGION * len(parts.paint) - sum(piece.bytes() for piece in roots)
-    leaves = [(-piece.error, number, piece) for number, piece in enumerate(roots)]
-    heapq.heapify(leaves)
-    made = len(leaves)
-    error, size = rest + sum(piece.error for piece in roots), prices.REGION * len(parts.paint)
-    while leaves and made < MOST_BANDS and -leaves[0][0] > prices.REGION * worth(error, size, negligible=0):
+    others = prices.REGION * (len(parts.paint) - len(roots))
+
+    def byte(pieces: list[_Piece]) -> float:
+        """Return the error that a byte is worth if the image has these pieces [levels squared]."""
+        error, size = (sum(each) for each in zip(*((one.error, one.bytes()) for one in pieces), strict=True))
+        return prices.worth(rest + error, others + size, negligible=0)
+
+    leaves, whole = list(roots), list[_Piece]()
+    while leaves and len(leaves) + len(whole) < MOST_BANDS:
         check()
-        piece = heapq.heappop(leaves)[2]
+        leaves.sort(key=lambda piece: piece.error)
+        piece, price = leaves[-1], byte(leaves + whole)
+        if piece.error <= prices.REGION * price:
+            break
+        leaves.pop()
         halves = _halves(image, piece, gradients)
         gain = piece.error - sum(half.error for half in halves)
         growth = sum(half.bytes() for half in halves) - piece.bytes()
-        is_gain = gain > growth * worth(error, size, negligible=0)
-        if len(halves) < 2 or not (is_gain or _is_one_tone(image[piece.box()][piece.mask], noise)):
-            continue
-        piece.halves.extend(halves)
-        error, size = error - gain, size + growth
-        for half in halves:
-            made += 1
-            heapq.heappush(leaves, (-half.error, made, half))
+        is_one_tone = _is_one_tone(image[piece.box()][piece.mask], noise)
+        if len(halves) > 1 and (gain > growth * price or is_one_tone):
+            piece.halves.extend(halves)
+            leaves += halves
+        else:
+            whole.append(piece)
     # The first cuts of a shadow gain little without those that follow: only now those not worth it go.
-    bands, fewer = list[_Piece](), roots
-    while len(bands) != len(fewer):
-        bands = fewer
-        fewer = [band for piece in roots for band in _worthwhile(piece, worth(error, size, negligible=0))]
-        error, size = rest + sum(band.error for band in fewer), others + sum(band.bytes() for band in fewer)
+    bands, count = leaves + whole, 0
+    while len(bands) != count:
+        count, price = len(bands), byte(bands)
+        bands = [band for piece in roots for band in _worthwhile(piece, price)]
     return _with_bands(image, parts, bands)
 
 
@@ -140,20 +140,14 @@ def _halves(image: Floats, piece: _Piece, gradients: Gradients) -> list[_Piece]:
     pixels = own[mask].astype(np.float64)
     tone = np.zeros(mask.shape)
     tone[mask] = ((pixels - pixels.mean(axis=0)) * _direction(pixels)).sum(axis=1)
-    soft = filters.blurred_within(tone, mask, SOFT)
-    light = soft > _threshold(soft[mask])
-    for _ in range(2):  # what is too small goes to the other half, where it may join what is too small there
-        settled = True
-        for half in (light, ~light):
-            inside = mask & half
-            _, numbers = cv2.connectedComponents(inside.astype(np.uint8), connectivity=4)
-            small = np.bincount(numbers[inside], minlength=1) < LEAST_BAND
-            small[0] = False
-            if small.any():
-                light ^= small[numbers]
-                settled = False
-        if settled:
-            break
+    soft = filters.blurred_within(tone, mask, BLUR)  # noise does not fray the bands
+    light = soft > soft[mask].mean()
+    for half in (light, ~light):  # what is too small goes to the other half
+        inside = mask & half
+        _, numbers = cv2.connectedComponents(inside.astype(np.uint8), connectivity=4)
+        small = np.bincount(numbers[inside], minlength=1) < LEAST_BAND
+        small[0] = False
+        light ^= small[numbers]
     found = []
     for half in (light, ~light):
         _, numbers, boxes, _ = cv2.connectedComponentsWithStats(
@@ -166,26 +160,11 @@ def _halves(image: Floats, piece: _Piece, gradients: Gradients) -> list[_Piece]:
 
 
 def _direction(pixels: Floats) -> Floats:
-    """Return the unit vector along which colours, shape (pixel, channel), vary most."""
+    """Return about the unit vector along which colours, shape (pixel, channel), vary most."""
     off = pixels - pixels.mean(axis=0)
     matrix = product(off.T, off)
     direction = matrix[:, matrix.diagonal().argmax()]
-    for _ in range(POWERS):
-        direction = direction / np.abs(direction).max()
-        direction = (matrix * direction).sum(axis=1)
     return direction / np.sqrt((direction**2).sum())
-
-
-def _threshold(tones: Floats) -> float:
-    """Return the tone that leaves the least variance on both of its sides (Otsu 1979)."""
-    low, high = float(tones.min()), float(tones.max())
-    counts, edges = np.histogram(tones, TONES, (low, max(high, low + 1e-3)))
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    below = np.cumsum(counts)[:-1].astype(np.float64)
-    sums = np.cumsum(counts * middles)
-    above = len(tones) - below
-    apart = sums[:-1] / np.maximum(below, 1) - (sums[-1] - sums[:-1]) / np.maximum(above, 1)
-    return float(edges[1:-1][(below * above * apart**2).argmax()])
 
 
 def _piece(image: Floats, left: int, top: int, mask: Bools, gradients: Gradients) -> _Piece:
@@ -206,10 +185,8 @@ def _with_bands(image: Floats, parts: Parts, pieces: list[_Piece]) -> Parts:
     labels, fills = parts.labels.copy(), parts.fills.copy()
     for number, piece in enumerate(pieces, len(parts.paint)):
         labels[piece.box()][piece.mask] = number
-        color = image[piece.box()] if piece.coloring.ramp else piece.coloring.color
-        fills[piece.box()][piece.mask] = np.broadcast_to(color, (*piece.mask.shape, image.shape[2]))[
-            piece.mask
-        ]
+        is_flat = piece.coloring.ramp is None
+        fills[piece.box()][piece.mask] = piece.coloring.color if is_flat else image[piece.box()][piece.mask]
     first = len(parts.colorings)
     paint = np.concatenate([parts.paint, np.arange(first, first + len(pieces), dtype=parts.paint.dtype)])
     return Parts(labels, fills, paint, parts.colorings + [piece.coloring for piece in pieces])

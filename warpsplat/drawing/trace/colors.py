@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.grids import Floats
 from warpsplat.drawing.trace.partition import Partition
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.seeds import ROUNDING
@@ -23,39 +23,41 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
     """
     if partition.scale == 1:
         return partition
-    image, least = regions.image, ROUNDING + regions.noise
-    known, count = np.array([coloring.color for coloring in partition.colorings]), len(partition.colorings)
+    known, count = np.array([c.color for c in partition.colorings], np.float64), len(partition.colorings)
     flat = np.array([c.ramp is None and not c.is_band for c in partition.colorings], np.bool_)
-    height, width = image.shape[:2]
+    height, width = regions.image.shape[:2]
+    shown = regions.image.reshape(-1, 4).astype(np.float64)
     cells = _by_pixel(partition.paint[partition.labels], height, width)
     is_mixed = (cells != cells[:, :1]).any(axis=1)
-    pure, shown = cells[~is_mixed, 0], image.reshape(-1, 4).astype(np.float64)
-    mixed, cells = np.flatnonzero(is_mixed), cells[is_mixed]
-    # What gradients show is known.
-    fills = _by_pixel(partition.fills, height, width)[mixed]
-    rest = shown[mixed] - (fills * ~flat[cells][..., None]).mean(axis=1)
-    keys, counts = np.unique(np.arange(len(cells))[:, None] * count + cells, return_counts=True)
-    (pixel, paint), area = np.divmod(keys, count), counts / cells.shape[1]
-    goal = _sums(pure, shown[~is_mixed], count) + _sums(paint, area[:, None] * rest[pixel], count)
+    pure, whole = cells[~is_mixed, 0], shown[~is_mixed]
+    cells, left = cells[is_mixed], shown[is_mixed]
+    left -= _by_pixel(partition.fills, height, width)[is_mixed].mean(axis=1, dtype=np.float64)
+    # The area of each colouring in each mixed pixel where it is.
+    keys, counts = np.unique(
+        cells.astype(np.int64) * len(cells) + np.arange(len(cells))[:, None], return_counts=True
+    )
+    paint, pixel = np.divmod(keys, max(len(cells), 1))
+    area, first = counts / cells.shape[1], np.searchsorted(paint, np.arange(count + 1))
     inner = np.bincount(pure, minlength=count)
     weight = inner + np.bincount(paint, area * area, count)
-    one, other, product = _products(pixel, paint, area, count)
-    first, colors = np.searchsorted(one, np.arange(count + 1)), np.where(flat[:, None], known, 0.0)
-    for _ in range(SWEEPS):
-        for k in np.flatnonzero(flat & (weight > 0)).tolist():
-            own = slice(first[k], first[k + 1])
-            beside = (product[own, None] * colors[other[own]]).sum(axis=0)
-            colors[k] = np.clip((goal[k] - beside) / weight[k], 0, 255)
+    sums = np.stack([np.bincount(pure, channel, count) for channel in whole.T], axis=1)
 
     def error(colors: Floats) -> Floats:
         """Return the squared error of the pixels of each colouring, by the areas in which they show it."""
-        whole = np.square(shown[~is_mixed] - colors[pure]).sum(axis=1)
-        model = _sums(pixel, area[:, None] * colors[paint], len(mixed))
-        mix = np.square(rest - model).sum(axis=1)
-        return np.asarray(np.bincount(pure, whole, count) + np.bincount(paint, area * mix[pixel], count))
+        off, mixed = (np.square(each).sum(axis=1) for each in (whole - colors[pure], left))
+        return np.asarray(np.bincount(pure, off, count) + np.bincount(paint, area * mixed[pixel], count))
 
-    before = np.where(flat[:, None], known, 0.0)
-    changed = flat & (error(colors) < error(before) / 2) & (np.abs(colors - before).max(axis=1) > least)
+    before, colors = error(known), known.copy()
+    for _ in range(SWEEPS):
+        for k in np.flatnonzero(flat & (weight > 0)).tolist():
+            own = slice(first[k], first[k + 1])
+            share = area[own, None]
+            lack = sums[k] - inner[k] * colors[k] + (share * left[pixel[own]]).sum(axis=0)
+            color = np.clip(colors[k] + lack / weight[k], 0, 255)
+            left[pixel[own]] -= share * (color - colors[k])
+            colors[k] = color
+    is_off = np.abs(colors - known).max(axis=1) > ROUNDING + regions.noise
+    changed = flat & is_off & (error(colors) < before / 2)
     if not changed.any():
         return partition
     colorings = [
@@ -65,27 +67,8 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
     return replace(partition, colorings=colorings)
 
 
-def _products(pixel: Ints, paint: Ints, area: Floats, count: int) -> tuple[Ints, Ints, Floats]:
-    """Return pairs of colourings in one pixel, in order, and the sums of the products of their areas."""
-    pairs, products = [np.zeros(0, np.intp)], [np.zeros(0)]
-    step = 1
-    while len(first := np.flatnonzero(pixel[step:] == pixel[: len(pixel) - step])):
-        last = first + step
-        pairs += [paint[first] * count + paint[last], paint[last] * count + paint[first]]
-        products += [area[first] * area[last]] * 2
-        step += 1
-    found, which = np.unique(np.concatenate(pairs), return_inverse=True)
-    one, other = np.divmod(found, count)
-    return one, other, np.asarray(np.bincount(which, np.concatenate(products), len(found)), np.float64)
-
-
 def _by_pixel(cells: Any, height: int, width: int) -> Any:
     """Return values of cells (row, column, ...) as those of pixels, shape (pixel, cell, ...)."""
     scale, rest = len(cells) // height, cells.shape[2:]
     cells = cells.reshape(height, scale, width, scale, *rest).swapaxes(1, 2)
     return cells.reshape(height * width, scale * scale, *rest)
-
-
-def _sums(which: Ints, values: Floats, count: int) -> Floats:
-    """Return the sum of the values (n, channel) of each of ``count`` things, (count, channel)."""
-    return np.stack([np.bincount(which, channel, count) for channel in values.T], axis=1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats, Ints, Sets
+from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.drawing.trace.nesting import shared_borders
 from warpsplat.drawing.trace.palette import least_worth
 from warpsplat.drawing.trace.regions import Regions
@@ -32,14 +32,12 @@ def fewer_regions(regions: Regions, most: int, price: float = 1.0) -> Regions:
     sizes = np.bincount(regions.labels.reshape(-1), minlength=count).tolist()
     colors = np.array([coloring.color for coloring in regions.colorings])[regions.paint]
     merged = _merge(beside, sizes, colors, most, dearest)
-    numbers = np.unique(merged, return_inverse=True)[1]
+    left, numbers = np.unique(merged, return_inverse=True)
     labels = numbers[regions.labels].astype(np.int32)
-    paint = np.zeros(int(numbers.max()) + 1, np.int32)
-    paint[numbers[merged]] = regions.paint[merged]
     changed = (merged != np.arange(count))[regions.labels]
     fills = regions.fills.copy()
     fills[changed] = colors[merged][regions.labels[changed]]
-    return replace(regions, labels=labels, paint=paint, fills=fills)
+    return replace(regions, labels=labels, paint=regions.paint[left], fills=fills)
 
 
 def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, dearest: float) -> Ints:
@@ -52,7 +50,7 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
         most: Regions that are to be left.
         dearest: Squared error that a merge may add if there are no more [levels squared].
     """
-    sets, left, gone = Sets(len(beside)), len(beside), [False] * len(beside)
+    left, merged = len(beside), np.arange(len(beside))
     heap: list[tuple[float, int, int, int]] = []  # cost, region, neighbour, size of the region at the time
 
     def push(region: int) -> None:
@@ -69,12 +67,12 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
         cost, region, into, size = heapq.heappop(heap)
         if left <= most and cost > dearest:
             break
-        if gone[region]:
+        if merged[region] != region:
             continue
-        if gone[into] or size != sizes[region]:
+        if merged[into] != into or size != sizes[region]:
             push(region)
             continue
-        gone[region] = True
+        merged[region] = into
         left -= 1
         sizes[into] += sizes[region]
         for other in beside[region]:
@@ -82,6 +80,6 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
             if other != into:
                 beside[other].add(into)
                 beside[into].add(other)
-        sets.join(region, into)
-    stayed = {sets.find(region): region for region in np.flatnonzero(~np.array(gone)).tolist()}
-    return np.asarray([stayed[sets.find(region)] for region in range(len(gone))], np.int64)
+    while (merged != merged[merged]).any():
+        merged = merged[merged]
+    return merged

@@ -125,8 +125,8 @@ def linked_components(across: Bools, down: Bools, inside: Bools) -> tuple[int, I
     return count - 1, np.asarray(parts[::2, ::2] - 1, np.int32)
 
 
-def components(values: Ints, image: Floats) -> Ints:
-    """Label the connected components of equal ``values``, shape (height, width).
+def components(values: Ints, image: Floats) -> tuple[Ints, Ints]:
+    """Label the connected components of equal ``values``, shape (height, width); return their values, too.
 
     Where two values meet as on a chessboard, ``prefers_main_diagonal`` decides which pair is connected.
     """
@@ -140,7 +140,10 @@ def components(values: Ints, image: Floats) -> Ints:
             sets.join(int(parts[y, x]), int(parts[y + 1, x + 1]))
         else:
             sets.join(int(parts[y, x + 1]), int(parts[y + 1, x]))
-    return sets.numbers()[parts]
+    labels = sets.numbers()[parts]
+    of_each = np.zeros(int(labels.max()) + 1, np.int32)
+    of_each[labels] = values
+    return labels, of_each
 
 
 def crossings(labels: Ints) -> Bools:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from warpsplat.drawing import prices
@@ -16,14 +15,14 @@ from warpsplat.drawing.trace.grids import (
     channel_max,
     components,
     dilated,
-    eroded,
 )
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, mixed, neighbours
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
+from warpsplat.portable import filters
 from warpsplat.scene.scene import numbers_in
 
-ALONG = 5  # [px] side of the square within which a thin part has one ink
+ALONG = 5  # [px] side of the square within which thin parts have one ink
 STEP = 16  # [levels] between colours of thin parts that are tried as inks
 TRIED = 48  # of them, the most frequent ones
 LEAST_INK = 0.4  # share of an ink in a colour that is taken for a mixture with it
@@ -40,14 +39,14 @@ def with_inks(regions: Regions) -> Regions:
     painted = regions.paint[regions.labels]
     flat = [k for k in numbers_in(painted).tolist() if regions.colorings[k].ramp is None]
     colors = {k: regions.colorings[k].color for k in flat}
-    solid = [k for k in flat if _is_solid(regions.image, painted == k, colors[k])]
+    solid = sorted(set(flat) & _solid(regions, painted))
     if not solid or len(solid) == len(flat):
         return regions
     bases = {}
     for k in set(flat) - set(solid):
         own = painted == k
         beside = painted[dilated(own, 5) & ~own]
-        bases[k] = base = colors[max(solid, key=lambda j: int((beside == j).sum()))]
+        bases[k] = base = colors[solid[np.bincount(beside, minlength=len(regions.colorings))[solid].argmax()]]
         toward = colors[k] - base
         pixels = regions.image[own]
         share = ((pixels - base) * toward).sum(axis=1) / max(float((toward**2).sum()), 1.0)
@@ -66,123 +65,82 @@ def with_inks(regions: Regions) -> Regions:
         else:
             inks.append(k)
             colorings[k] = replace(colorings[k], color=colors[k])
-    where = np.isin(painted, sorted(bases))
-    return _with_more_inks(replace(regions, paint=paint, colorings=colorings), where)
+    return _with_more_inks(
+        _painted(regions, paint[regions.labels], colorings), np.isin(painted, sorted(bases))
+    )
+
+
+def _painted(regions: Regions, painted: Ints, colorings: list[Coloring]) -> Regions:
+    """Return regions by the colouring of each pixel; gradients stay where they are."""
+    labels, paint = components(painted, regions.image)
+    flat = np.array([coloring.ramp is None for coloring in colorings])[painted]
+    fills = regions.fills.copy()
+    fills[flat] = np.array([coloring.color for coloring in colorings])[painted[flat]]
+    return replace(regions, labels=labels, paint=paint, fills=fills, colorings=colorings)
 
 
 def _with_more_inks(regions: Regions, where: Bools) -> Regions:
     """Return regions whose thin parts, which are ``where``, have more inks if these are worth their bytes."""
-    painted = regions.paint[regions.labels]
-    pixels = _ThinPixels.of(regions, painted, where)
-    tried, own = pixels.usual_colors(), painted[where]
-    errors, left = [pixels.errors(ink) for ink in tried], np.zeros(len(own))
-    for k in numbers_in(own).tolist():
-        left[own == k] = pixels.errors(regions.colorings[k].color)[own == k]
-    colorings, values, parts = list(regions.colorings), 3 * where.size * 255.0**2, pixels.parts(own)
-    while True:
-        best = max(range(len(tried)), key=lambda i: float(np.maximum(left - errors[i], 0).sum()))
-        nearer = pixels.along(errors[best]) < pixels.along(left)
-        changed = np.where(nearer, len(colorings), own)
-        after, count = np.where(nearer, errors[best], left), pixels.parts(changed)
-        size = prices.REGION * (pixels.others + max(parts, count))
-        byte = prices.worth(float(left.sum()) / values, size)
-        if float((left - after).sum()) / values <= prices.REGION * max(count - parts, 1) * byte:
-            break
-        colorings.append(Coloring(np.round(tried[best])))
-        own, left, parts = changed, after, count
-    if len(colorings) == len(regions.colorings):
-        return regions
-    painted, fills = painted.copy(), regions.fills.copy()
-    painted[where] = own
-    fills[where] = np.array([coloring.color for coloring in colorings])[own]
-    labels = components(painted, regions.image)
-    paint = np.zeros(int(labels.max()) + 1, np.int32)
-    paint[labels] = painted
-    return replace(regions, labels=labels, fills=fills, paint=paint, colorings=colorings)
+    painted, shown = regions.paint[regions.labels], regions.image[where]
+    owners, bases = _beside(regions, painted, where)
 
-
-@dataclass(frozen=True)
-class _ThinPixels:
-    """The pixels of thin parts, and what is beside them."""
-
-    where: Bools
-    """Shape (height, width)."""
-    kinds: Ints
-    """The colouring that each pixel of the image had, shape (height, width)."""
-    others: int
-    """Regions that are not thin."""
-    colors: Floats
-    """Shape (pixel, channel)."""
-    owners: Ints
-    """For each colour beside a pixel, the pixel; shape (base,)."""
-    bases: Floats
-    """The colours beside them, shape (base, channel)."""
-
-    @staticmethod
-    def of(regions: Regions, painted: Ints, where: Bools) -> _ThinPixels:
-        """Return some pixels of an image; ``painted``: the colouring of each of its pixels."""
-        rows, columns = np.nonzero(where)
-        found, index, _ = neighbours(np.where(where, NO_REGION, painted), rows, columns, REACH)
-        known = found != NO_REGION
-        pair = np.nonzero(known)[1] * len(regions.colorings) + found[known]
-        first = np.unique(pair, return_index=True)[1]
-        bases = regions.fills.reshape(-1, regions.fills.shape[2])[index[known][first]]
-        others = len(numbers_in(regions.labels[~where]))
-        owners = np.nonzero(known)[1][first]
-        return _ThinPixels(where, painted, others, regions.image[where], owners, bases)
-
-    def usual_colors(self) -> Floats:
-        """Return the most frequent colours, about, shape (color, channel)."""
-        cells = np.round(self.colors / STEP)
-        _, owner, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-        usual = np.argsort(-counts, kind="stable")[:TRIED].tolist()
-        return np.array([self.colors[owner.reshape(-1) == i].mean(axis=0) for i in usual])
-
-    def errors(self, ink: Floats) -> Floats:
-        """Return the squared error of each pixel as a mixture with an ink, shape (pixel,)."""
-        error = ((self.colors - ink) ** 2).sum(axis=1)
-        pixels = self.colors[self.owners]
-        share = np.clip(mixed(pixels, ink, self.bases)[0], 0, 1)
-        off = ((pixels - self.bases - share[:, None] * (ink - self.bases)) ** 2).sum(axis=1)
-        np.minimum.at(error, self.owners, off)
+    def errors(ink: Floats) -> Floats:
+        """Return the squared error of each pixel as a mixture of an ink and what is beside."""
+        error, pixels = ((shown - ink) ** 2).sum(axis=1), shown[owners]
+        share = np.clip(mixed(pixels, ink, bases)[0], 0, 1)
+        np.minimum.at(error, owners, ((pixels - bases - share[:, None] * (ink - bases)) ** 2).sum(axis=1))
         return error
 
-    def along(self, values: Floats) -> Floats:
-        """Return the sum of values along the thin part that each pixel is in, shape (pixel,)."""
-        height, width = self.kinds.shape
-        reach = ALONG // 2
-        padded = np.pad(self.kinds, reach, constant_values=NO_REGION)
-        grid = np.zeros(padded.shape, np.float64)
-        grid[reach : reach + height, reach : reach + width][self.where] = values
-        rows, columns = np.nonzero(self.where)
-        own, total = self.kinds[self.where], np.zeros(len(values))
-        for down in range(ALONG):
-            for right in range(ALONG):
-                place = rows + down, columns + right
-                total += np.where(padded[place] == own, grid[place], 0)
-        return total
+    def along(values: Floats) -> Floats:
+        """Return the sums of values near each pixel."""
+        grid = np.zeros(where.shape, np.float64)
+        grid[where] = values
+        return filters.box_sum(grid, ALONG)[where]
 
-    def parts(self, inks: Ints) -> int:
-        """Return how many connected parts pixels of some inks make up."""
-        painted = np.full(self.where.shape, NO_REGION, np.int32)
-        painted[self.where] = inks
-        parts = components(painted, np.zeros((*painted.shape, 1), np.float32))
-        return len(numbers_in(parts[self.where]))
+    tried, own = _usual_colors(shown), painted[where]
+    after, left = [errors(ink) for ink in tried], np.zeros(len(own))
+    for k in numbers_in(own).tolist():
+        left[own == k] = errors(regions.colorings[k].color)[own == k]
+    values = 3 * where.size * 255.0**2
+    while True:
+        best = max(range(len(tried)), key=lambda i: float(np.maximum(left - after[i], 0).sum()))
+        is_nearer = along(after[best]) < along(left)
+        painted[where] = np.where(is_nearer, len(regions.colorings), painted[where])
+        found = _painted(regions, painted, [*regions.colorings, Coloring(np.round(tried[best]))])
+        more, size = len(found.paint) - len(regions.paint), max(len(found.paint), len(regions.paint))
+        byte = prices.worth(float(left.sum()) / values, prices.REGION * size)
+        gain = float((left - after[best])[is_nearer].sum()) / values
+        if gain <= prices.REGION * max(more, 1) * byte:
+            return regions
+        regions, left = found, np.where(is_nearer, after[best], left)
 
 
-def _is_solid(image: Floats, own: Bools, color: Floats) -> bool:
-    """Return whether a colour covers an area, or a line as long as no letter's."""
-    rows, columns = np.flatnonzero(own.any(axis=1)), np.flatnonzero(own.any(axis=0))
-    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    image, own = image[box], own[box]
-    inner = np.flatnonzero(eroded(own, 3))
-    if len(inner):  # one place is likely to tell, at a fraction of the time
-        y, x = divmod(int(inner[len(inner) // 2]), own.shape[1])
-        near = image[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
-        if np.abs(near - color).max() <= MIXED:
-            return True
-    exact = own & (channel_max(np.abs(image - color)) <= MIXED)
-    if eroded(exact, 3).any():
-        return True
-    _, _, stats, _ = cv2.connectedComponentsWithStats(exact.astype(np.uint8), connectivity=8)
-    return bool((stats[1:, cv2.CC_STAT_AREA] >= SOLID).any())
+def _beside(regions: Regions, painted: Ints, where: Bools) -> tuple[Ints, Floats]:
+    """Return the colours of what is beside thin parts, (base, channel), and the pixel that each is beside."""
+    rows, columns = np.nonzero(where)
+    found, index, _ = neighbours(np.where(where, NO_REGION, painted), rows, columns, REACH)
+    known = found != NO_REGION
+    pixel = np.nonzero(known)[1]
+    first = np.unique(pixel * len(regions.colorings) + found[known], return_index=True)[1]
+    return pixel[first], regions.fills.reshape(-1, regions.fills.shape[2])[index[known][first]]
+
+
+def _usual_colors(shown: Floats) -> Floats:
+    """Return the most frequent ones among colours (pixel, channel), about, shape (color, channel)."""
+    _, owner, counts = np.unique(np.round(shown / STEP), axis=0, return_inverse=True, return_counts=True)
+    usual = np.argsort(-counts, kind="stable")[:TRIED].tolist()
+    return np.array([shown[owner.reshape(-1) == i].mean(axis=0) for i in usual])
+
+
+def _solid(regions: Regions, painted: Ints) -> set[int]:
+    """Return the colourings that cover an area, or a line as long as no letter's."""
+    is_exact = channel_max(np.abs(regions.image - regions.fills)) <= MIXED
+    exact = np.where(is_exact, painted, NO_REGION)
+    around = np.pad(exact, 1, mode="edge")
+    height, width = exact.shape
+    inner = [(around[y : y + height, x : x + width] == exact) for y, x in np.ndindex(3, 3)]
+    labels, values = components(exact, regions.image)
+    long = values[np.bincount(labels.reshape(-1)) >= SOLID]
+    return {*numbers_in(exact[is_exact & np.logical_and.reduce(inner)]).tolist(), *long.tolist()} - {
+        NO_REGION
+    }

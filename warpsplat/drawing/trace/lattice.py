@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy.typing as npt
 
 from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.portable import elementary
+from warpsplat.portable.sequences import interp
 
 PART = 1024  # [px] most rows and columns, from the middle of an image, that are inspected
 CELLS = (8, 256)  # fewest and most cells on a side
@@ -19,6 +22,7 @@ SHORTEST = 1.4  # [px] period
 COHERENCE = 0.7  # least share of the edges, as a vector sum, that a lattice must explain
 NEARLY = 0.9  # least ratio of what is about equal: coherences of multiples of a period, sides of a cell
 SNAP = 0.15  # share of a cell that lines at the borders may be off for an image to consist of whole cells
+FINE = 0.25  # [px] that the borders of cells are rounded to where they are no whole numbers of cells
 NOISES = 2.0  # largest difference of a cell from its colour, over the RMS of the pixels' errors
 SHARPENINGS = 4  # times that interpolated colours are compared with the image, and corrected
 EXPLAINED = 0.9
@@ -46,27 +50,30 @@ class Axis(NamedTuple):
         return np.concatenate([[0.0], inner, [float(size)]])
 
 
-class Lattice(NamedTuple):
-    """An image as cells."""
+@dataclass(frozen=True)
+class Cells:
+    """An image as cells of one colour each."""
 
-    columns: Axis
-    rows: Axis
     colors: Ints
     """Number of each cell's colour, shape (row, column)."""
     palette: Ints
     """Levels in 0..255, shape (color, channel)."""
+    across: Floats | Ints
+    """Borders of the columns [px], shape (column + 1,)."""
+    down: Floats | Ints
+    """Borders of the rows [px], shape (row + 1,)."""
+    per_pixel: float
+    """Units per pixel in which all borders are whole numbers."""
 
 
-def find_lattice(levels: Ints) -> Lattice | None:
+def find_lattice(levels: Ints) -> Cells | None:
     """Return the cells that make up an image, with noise or soft borders; None if it is not made of cells.
 
     ``levels``: 0..255, shape (height, width, channel).
     """
-    red, green, blue = (levels[..., channel].astype(np.int16) for channel in range(3))
-    tone = red + green + blue
-    two = (
-        np.uint8(255) * (2 * tone >= tone.min() + tone.max())[..., None]
-    )  # blurred cells have sharp edges so
+    tone = levels[..., :3].sum(axis=2, dtype=np.int16)
+    is_light = 2 * tone >= tone.min() + tone.max()  # blurred cells of two tones have sharp edges so
+    two = np.uint8(255) * is_light[..., None]
     for view, soft in ((levels, False), (levels, True), (two, False)):
         columns = find_axis(view, 1, soft=soft)
         rows = find_axis(view, 0, soft=soft) if columns else None
@@ -152,7 +159,7 @@ def _snapped(axis: Axis, size: int) -> Axis:
     return axis
 
 
-def _with_colors(levels: Ints, view: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Lattice | None:
+def _with_colors(levels: Ints, view: Ints, columns: Axis, rows: Axis, *, soft: bool) -> Cells | None:
     """Return the cells with their colours; None if these are too many, or do not explain the image.
 
     ``view``: the image, or its two tones, that tells which cells have the same colour.
@@ -167,19 +174,16 @@ def _with_colors(levels: Ints, view: Ints, columns: Axis, rows: Axis, *, soft: b
     def at_centers(image: npt.NDArray[Any]) -> Floats:
         return np.median(image[inside].reshape(*inner.shape, *lines.shape, image.shape[2]), axis=(1, 3))
 
-    def shown(colors: Floats) -> list[Floats]:
-        """Return cells as they are sampled, antialiased and interpolated."""
-        return [
-            along(along(colors, down, height, 0), across, width, 1)
-            for along in (_sampled, _averaged, _interpolated)
-        ]
+    def shown(colors: Floats, along: Callable[[Floats, Floats, int], Floats]) -> Floats:
+        return along(along(colors, down, height).swapaxes(0, 1), across, width).swapaxes(0, 1)
 
     def error(colors: Floats) -> Floats:
-        return min((np.square(levels - image) for image in shown(colors)), key=np.sum)
+        both = (np.square(levels - shown(colors, along)) for along in (_averaged, _interpolated))
+        return min(both, key=np.sum)
 
     colors = seen = at_centers(view)
     for _ in range(SHARPENINGS if soft else 0):
-        colors = np.clip(colors + seen - at_centers(shown(colors)[2]), 0, 255)
+        colors = np.clip(colors + seen - at_centers(shown(colors, _interpolated)), 0, 255)
     # Cells beside strong edges are off by as much as pixels are.
     noise = NOISES * float(np.sqrt(error(colors).mean())) if view is levels else 0.0
     found = _numbered(colors, 1 + noise)
@@ -195,7 +199,12 @@ def _with_colors(levels: Ints, view: Ints, columns: Axis, rows: Axis, *, soft: b
     is_stray = 2 * off > int(view.max()) - int(view.min())
     if error(cells).sum() > (1 - EXPLAINED) * variance or is_stray.mean() > STRAY:
         return None
-    return Lattice(columns, rows, numbers, np.round(palette).astype(np.int64))
+    longer = abs(height / columns.period - height / rows.period)  # what the sides of cells add up to [cells]
+    is_whole = columns.origin == rows.origin == 0 and longer < SNAP
+    per_pixel = 1 / columns.period if is_whole else 1 / FINE
+    if is_whole:
+        down = np.round(down * per_pixel) / per_pixel
+    return Cells(numbers, np.round(palette).astype(np.int64), across, down, per_pixel)
 
 
 def _numbered(colors: Floats, reach: float) -> tuple[Ints, Floats] | None:
@@ -224,27 +233,13 @@ def _inner(borders: Floats) -> Ints:
     return np.clip(first[:, None] + np.arange(count), 0, int(borders[-1]) - 1)
 
 
-def _sampled(colors: Floats, borders: Floats, size: int, axis: int) -> Floats:
-    """Return the colours of pixels along one axis: those of the cells that their centres are in."""
-    return np.take(colors, np.searchsorted(borders, np.arange(size) + 0.5, side="right") - 1, axis=axis)
+def _averaged(colors: Floats, borders: Floats, size: int) -> Floats:
+    """Return the mean colours of rows of pixels: cells may end within one. ``colors``: shape (cell, ...)."""
+    sums = np.cumsum((colors.T * np.diff(borders)).T, axis=0)
+    until = np.concatenate([np.zeros_like(sums[:1]), sums])
+    return np.diff(interp(np.arange(size + 1), borders, until), axis=0)
 
 
-def _interpolated(colors: Floats, borders: Floats, size: int, axis: int) -> Floats:
-    """Return the colours of pixels along one axis, interpolated between the centres of cells."""
-    places, centers = np.arange(size) + 0.5, (borders[:-1] + borders[1:]) / 2
-    before = np.clip(np.searchsorted(centers, places) - 1, 0, len(centers) - 2)
-    share = np.clip((places - centers[before]) / (centers[before + 1] - centers[before]), 0, 1)
-    share = share.reshape([-1, 1, 1] if axis == 0 else [1, -1, 1])
-    return (1 - share) * np.take(colors, before, axis=axis) + share * np.take(colors, before + 1, axis=axis)
-
-
-def _averaged(colors: Floats, borders: Floats, size: int, axis: int) -> Floats:
-    """Return the mean colours of pixels along one axis, as antialiased where cells end within."""
-    shape = [-1, 1, 1] if axis == 0 else [1, -1, 1]
-    places = np.arange(size + 1)
-    cells = np.minimum(np.searchsorted(borders, places, side="right") - 1, len(borders) - 2)
-    whole = colors * np.diff(borders).reshape(shape)
-    until = np.take(np.cumsum(whole, axis=axis) - whole, cells, axis=axis)
-    return np.diff(
-        until + (places - borders[cells]).reshape(shape) * np.take(colors, cells, axis=axis), axis=axis
-    )
+def _interpolated(colors: Floats, borders: Floats, size: int) -> Floats:
+    """Return the colours of rows of pixels, interpolated between the centres of cells."""
+    return interp(np.arange(size) + 0.5, (borders[:-1] + borders[1:]) / 2, colors)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, channel_max
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
 
-DIRECTIONS = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-"""Steps (row, column) along which neighbouring regions are looked for."""
+STEPS = np.array(list(np.ndindex(3, 3))) - 1
+"""Steps (row, column) along which regions are looked for: to the pixel itself, and in eight directions."""
 
 REACH = 3  # [px] how far
 CHUNK = 1 << 14  # pixels handled at once, which bounds the memory
@@ -29,10 +28,14 @@ class Mixtures:
 
     label: Ints
     """The region with the larger share; NO_REGION where none is near. Shape (pixel,)."""
-    color: Floats
-    """The colour of that region there, shape (pixel, channel)."""
+    other: Ints
+    """The other region, or the same."""
     share: Floats
-    """Its share, shape (pixel,)."""
+    """Share of the first, 1/2 to 1."""
+    color: Floats
+    """The colour of the first there, shape (pixel, channel)."""
+    contrast: Floats
+    """How far the two colours are apart [levels]."""
     residual: Floats
     """Distance of the pixel's colour from the mixture [levels]; infinite where no region is near."""
     base: Floats
@@ -62,8 +65,10 @@ def unmix(
     columns: Ints,
     noise: float = 0.0,
     reach: int = REACH,
+    apart: Bools | None = None,
+    main: tuple[int, Floats] | None = None,
 ) -> Mixtures:
-    """Find for each pixel the two regions beside it whose mixture is nearest to its colour.
+    """Find for each pixel the two regions, its own or beside it, whose mixture is nearest to its colour.
 
     Args:
         image: Shape (height, width, channel).
@@ -73,62 +78,85 @@ def unmix(
         columns: Of the pixels, shape (pixel,).
         noise: Where it is not 0, mixtures have some slack.
         reach: How far away regions are looked for [px].
+        apart: The regions that are not mixed with one another, shape (region,).
+        main: A region and its colour that may be mixed with those near where these alone do not explain a
+            pixel, wherever it is.
     """
-    parts = [
-        _unmix(image, labels, fills, rows[i : i + CHUNK], columns[i : i + CHUNK], noise, reach)
-        for i in range(0, max(len(rows), 1), CHUNK)
-    ]
+
+    def found(some: slice) -> Mixtures:
+        return _unmix(image, labels, fills, rows[some], columns[some], noise, reach, apart, main)
+
+    parts = [found(slice(i, i + CHUNK)) for i in range(0, max(len(rows), 1), CHUNK)]
     return Mixtures(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Mixtures)))
 
 
 def neighbours(labels: Ints, rows: Ints, columns: Ints, most: int) -> tuple[Ints, Ints, Floats]:
-    """Return region, index and distance of the nearest labelled pixel by direction, (direction, pixel)."""
-    height, width = labels.shape
-    shape = (len(DIRECTIONS), len(rows))
-    found = np.full(shape, NO_REGION, np.int32)
-    index = np.zeros(shape, np.int64)
+    """Return label, index and distance of each pixel and of the nearest others by direction, (9, pixel)."""
+    padded, own = np.pad(labels, most, constant_values=NO_REGION), labels[rows, columns]
+    shape = len(STEPS), len(rows)
+    found, index = np.full(shape, NO_REGION, np.int32), np.zeros(shape, np.int64)
     distance = np.full(shape, np.inf, np.float32)
-    for direction, (down, right) in enumerate(DIRECTIONS):
-        length = math.sqrt(down * down + right * right)
-        for reach in range(1, most + 1):
+    for i, (down, right) in enumerate(STEPS.tolist()):
+        length = float(np.sqrt(down * down + right * right))
+        for reach in range(most, 0, -1) if length else (0,):
             y, x = rows + reach * down, columns + reach * right
-            near = (y >= 0) & (y < height) & (x >= 0) & (x < width) & (found[direction] == NO_REGION)
-            y, x = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
-            near &= labels[y, x] != NO_REGION
-            found[direction][near] = labels[y, x][near]
-            index[direction][near] = (y * width + x)[near]
-            distance[direction][near] = reach * length
+            label = padded[y + most, x + most]
+            near = (label != NO_REGION) & ((label != own) | (reach == 0))
+            found[i][near], distance[i][near] = label[near], reach * length
+            index[i][near] = (y * labels.shape[1] + x)[near]
     return found, index, distance
 
 
 def _unmix(
-    image: Floats, labels: Ints, fills: Floats, rows: Ints, columns: Ints, noise: float, reach: int
+    image: Floats,
+    labels: Ints,
+    fills: Floats,
+    rows: Ints,
+    columns: Ints,
+    noise: float,
+    reach: int,
+    apart: Bools | None,
+    main: tuple[int, Floats] | None,
 ) -> Mixtures:
     found, index, distance = neighbours(labels, rows, columns, reach)
     colors = fills.reshape(-1, fills.shape[2])[index]
+    base = colors[np.argmin(distance, axis=0), np.arange(len(rows))]
+    pairs = list(itertools.combinations_with_replacement(range(len(STEPS)), 2))
+    if main is not None:
+        pairs += [(i, len(STEPS)) for i in range(len(STEPS))]
+        found = np.concatenate([found, np.full_like(found[:1], main[0])])
+        colors = np.concatenate([colors, np.broadcast_to(main[1], colors[:1].shape).astype(colors.dtype)])
+        distance = np.concatenate([distance, np.full_like(distance[:1], (MIXED + noise) / DISTANCE_COST)])
     # Each channel lies together: steps of four take several times as long.
     colors = np.moveaxis(np.ascontiguousarray(np.moveaxis(colors, 2, 0)), 0, 2)
     pixels = np.ascontiguousarray(image[rows, columns].T).T
     count, slack = len(rows), SLACK if noise else 0.0
-    best = np.full(count, np.inf, np.float32)
-    residual = np.full(count, np.inf, np.float32)
-    winner, share = np.zeros(count, np.int64), np.ones(count, np.float32)
-    for a, b in itertools.combinations_with_replacement(range(len(DIRECTIONS)), 2):
+    best, residual = np.full((2, count), np.inf, np.float32)
+    one, other, share = np.zeros(count, np.int64), np.zeros(count, np.int64), np.ones(count, np.float32)
+    for a, b in pairs:
         known = (found[a] != NO_REGION) & (found[b] != NO_REGION)
+        if apart is not None:
+            known &= (found[a] == found[b]) | ~(apart[found[a]] & apart[found[b]])
+        if not known.any():
+            continue
         t, off = mixed(pixels, colors[a], colors[b])
-        t = np.clip(t, 0, 1)
         contrast = channel_max(np.abs(colors[a] - colors[b])) if slack else 0
-        off = np.maximum(off - slack * contrast, 0) + RESIDUAL_WEIGHT * off
-        cost = np.where(known, off + DISTANCE_COST * (distance[a] + distance[b]), np.inf)
+        order, off = RESIDUAL_WEIGHT * off, np.maximum(off - slack * contrast, 0)
+        if b == len(STEPS):
+            known &= off <= MIXED + noise
+        cost = np.where(known, off + order + DISTANCE_COST * (distance[a] + distance[b]), np.inf)
         better = cost < best
-        best[better], residual[better] = cost[better], off[better]
-        winner[better] = np.where(t >= 0.5, a, b)[better]
-        share[better] = np.maximum(t, 1 - t)[better]
-    each = np.arange(count)
+        best[better], residual[better], share[better] = cost[better], off[better], t[better]
+        one[better], other[better] = a, b
+    is_other, share, each = share < 0.5, np.clip(share, 0, 1), np.arange(count)
+    one, other = np.where(is_other, other, one), np.where(is_other, one, other)
+    color = colors[one, each]
     return Mixtures(
-        label=found[winner, each],
-        color=colors[winner, each],
-        share=share,
+        label=found[one, each],
+        other=found[other, each],
+        share=np.maximum(share, 1 - share),
+        color=color,
+        contrast=channel_max(np.abs(color - colors[other, each])),
         residual=residual,
-        base=colors[np.argmin(distance, axis=0), each],
+        base=base,
     )

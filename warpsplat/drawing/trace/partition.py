@@ -18,7 +18,7 @@ from warpsplat.drawing.trace.grids import Bools, Floats, Ints, components, dilat
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.shares import Shares, beside_borders, find_shares
+from warpsplat.drawing.trace.shares import Shares, beside_borders, colors_at, find_shares
 from warpsplat.scene.scene import numbers_in
 
 SCALES = 4, 3, 2
@@ -77,10 +77,8 @@ def find_partition(regions: Regions) -> Partition:
     cells = scale * rows[:, None, None] + down, scale * columns[:, None, None] + right
     painted[cells], lead[cells] = _leading(shares, rows, columns, scale)
     down, right = np.ogrid[: painted.shape[0], : painted.shape[1]]
-    fills = shares.colors.at(painted, *np.broadcast_arrays(down // scale, right // scale))
-    labels = components(painted, fills)
-    paint = np.zeros(int(labels.max()) + 1, np.int32)
-    paint[labels] = painted
+    fills = colors_at(regions, painted, *np.broadcast_arrays(down // scale, right // scale))
+    labels, paint = components(painted, fills)
     return Partition(labels, fills, lead, paint, regions.colorings, scale, shares.doubt)
 
 

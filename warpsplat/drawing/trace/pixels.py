@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, linked_components
-from warpsplat.drawing.trace.lattice import MOST_COLORS, SNAP, Lattice, find_lattice
+from warpsplat.drawing.trace.lattice import MOST_COLORS, Cells, find_lattice
 from warpsplat.drawing.trace.planar import find_loops
 from warpsplat.errors import ImageError
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Rule, Scene
@@ -20,28 +18,8 @@ from warpsplat.scene.scene import starts_of
 
 MOST_CELLS = 262_144  # of pixel art: nobody would edit the outlines of more
 
-STRIP_ROWS = 64  # compared at once, which bounds the memory
-MOST_CORNERS = 32_000  # of a shape
-FINE = 0.25  # [px] that the borders of cells are rounded to
 
-
-@dataclass(frozen=True)
-class PixelArt:
-    """An image as cells of one colour each."""
-
-    colors: Ints
-    """Number of each cell's colour, shape (row, column)."""
-    palette: Floats
-    """sRGB in [0, 1] of each colour, and its opacity if there is one; shape (color, 3 or 4)."""
-    across: Floats | Ints
-    """Borders of the columns [px], shape (column + 1,)."""
-    down: Floats | Ints
-    """Borders of the rows [px], shape (row + 1,)."""
-    per_pixel: float
-    """Units per pixel in which all borders are whole numbers."""
-
-
-def find_cells(image: FloatArray) -> PixelArt:
+def find_cells(image: FloatArray) -> Cells:
     """Return the cells of pixel art: exactly, or with noise and soft borders removed if there is a lattice.
 
     Args:
@@ -59,47 +37,19 @@ def find_cells(image: FloatArray) -> PixelArt:
     if size == 1 and len(palette) > MOST_COLORS:
         lattice = find_lattice(levels)
         if lattice:
-            return _of_lattice(lattice, levels.shape[1], levels.shape[0])
+            return lattice
     if cells.shape[0] * cells.shape[1] > MOST_CELLS:
         shape = f"{cells.shape[1]}x{cells.shape[0]}"
         raise ImageError(f"{shape} cells, more than pixel art may have ({MOST_CELLS})")
-    return PixelArt(colors.reshape(cells.shape[:2]), _shares(palette), across, down, 1 / size)
+    return Cells(colors.reshape(cells.shape[:2]), palette, across, down, 1 / size)
 
 
-def _of_lattice(lattice: Lattice, width: int, height: int) -> PixelArt:
-    """Return the cells of a lattice: in units of a cell if the image begins with one, else of ``FINE`` px."""
-    columns, rows = lattice.columns, lattice.rows
-    longer = abs(height / columns.period - height / rows.period)  # what the sides of cells add up to [cells]
-    is_aligned = columns.origin == rows.origin == 0 and longer < SNAP
-    per_pixel = 1 / columns.period if is_aligned else 1 / FINE
-    across, down = columns.borders(width), rows.borders(height)
-    if is_aligned:
-        down = np.round(down * per_pixel) / per_pixel
-    return PixelArt(lattice.colors, _shares(lattice.palette), across, down, per_pixel)
-
-
-def _shares(levels: Ints) -> FloatArray:
-    """Return 8-bit levels as numbers in [0, 1]."""
-    return np.asarray(levels / 255, np.float32)
-
-
-def changes(
-    image: npt.NDArray[Any], converted: Callable[..., npt.NDArray[Any]] = np.asarray
-) -> tuple[Ints, Ints]:
-    """Return where the columns, and the rows, of an image differ from those before, its borders included.
-
-    Args:
-        image: Shape (height, width, channel).
-        converted: Applied to strips of it before they are compared.
-    """
+def changes(image: npt.NDArray[Any]) -> tuple[Ints, Ints]:
+    """Return where the columns, and the rows, of an image differ from those before, its borders included."""
     height, width = image.shape[:2]
-    across, down = np.ones(width + 1, np.bool_), np.ones(height + 1, np.bool_)
-    across[1:-1] = False
-    for top in range(0, height, STRIP_ROWS):
-        strip = converted(image[top : top + STRIP_ROWS + 1])
-        across[1:-1] |= (strip[:, 1:] != strip[:, :-1]).any(axis=(0, 2))
-        down[top + 1 : top + len(strip)] = (strip[1:] != strip[:-1]).any(axis=(1, 2))
-    return np.flatnonzero(across), np.flatnonzero(down)
+    across = 1 + np.flatnonzero((image[:, 1:] != image[:, :-1]).any(axis=(0, 2)))
+    down = 1 + np.flatnonzero((image[1:] != image[:-1]).any(axis=(1, 2)))
+    return np.concatenate([[0], across, [width]]), np.concatenate([[0], down, [height]])
 
 
 def cell_size(image: npt.NDArray[Any]) -> int:
@@ -125,25 +75,7 @@ def outlines(inside: Bools) -> list[Ints]:
     return np.split(loops.vertices[turns], np.cumsum(np.bincount(loop[turns]))[:-1])
 
 
-def polygons(inside: Bools) -> list[list[Ints]]:
-    """Return the outlines of cells as sets of polygons with no more than ``MOST_CORNERS`` each.
-
-    One set if that is enough; otherwise the cells are halved across their longer side, until it is.
-    """
-    if not inside.any():
-        return []
-    whole = outlines(inside)
-    height, width = inside.shape
-    if sum(map(len, whole)) <= MOST_CORNERS:
-        return [whole]
-    if height >= width:
-        halves = [(inside[: height // 2], 0, 0), (inside[height // 2 :], 0, height // 2)]
-    else:
-        halves = [(inside[:, : width // 2], 0, 0), (inside[:, width // 2 :], width // 2, 0)]
-    return [[ring + (left, top) for ring in rings] for half, left, top in halves for rings in polygons(half)]
-
-
-def _lines(corners: Ints, cells: PixelArt) -> Floats:
+def _lines(corners: Ints, cells: Cells) -> Floats:
     """Return a polygon as a ring of cubics, with handles at the thirds of its lines."""
     columns, rows = corners.T
     start = np.stack([cells.across[columns], cells.down[rows]], axis=1)
@@ -152,7 +84,7 @@ def _lines(corners: Ints, cells: PixelArt) -> Floats:
 
 
 def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tuple[Scene, float]:
-    """Return a scene that shows exactly the image, with one shape for a colour, or several for many corners.
+    """Return a scene that shows exactly the image, with one shape for a colour.
 
     Args:
         image: As ``find_cells`` takes it.
@@ -165,32 +97,28 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         ImageError: As ``find_cells``.
     """
     cells = find_cells(image)
-    sets = [polygons(cells.colors == i) for i in range(len(cells.palette))]
+    palette = (cells.palette / 255).astype(np.float32)
+    shapes = [outlines(cells.colors == i) for i in range(len(palette))]
     height, width = image.shape[:2]
     is_opaque = image.shape[2] == 3
     if not is_opaque:
         seen = cells.palette[:, 3] > 0
-    elif background is None:
-        paper = int(np.argmax([sum(len(ring) for rings in own for ring in rings) for own in sets]))
-        background = np.asarray(cells.palette[paper], np.float32)
-        seen = np.arange(len(sets)) != paper
     else:
-        seen = (np.round(255 * cells.palette) != np.round(255 * background)).any(axis=1)
-    shown = [(i, rings) for i in np.flatnonzero(seen).tolist() for rings in sets[i]]
-    contours = [[_lines(ring, cells) for ring in rings] for _, rings in shown]
-    palette = np.asarray(cells.palette[[i for i, _ in shown]], np.float32)
-    flat = list(itertools.chain.from_iterable(contours))
-    count = len(contours)
-    ground = np.asarray(background, np.float32) if is_opaque else None
+        if background is None:
+            background = palette[np.argmax([sum(map(len, rings)) for rings in shapes])]
+        seen = (cells.palette != np.round(255 * background)).any(axis=1)
+    palette, shapes = palette[seen], list(itertools.compress(shapes, seen))
+    contours = [_lines(ring, cells) for rings in shapes for ring in rings]
+    count = len(shapes)
     scene = Scene(
         # Adjacent shapes that are antialiased show what is behind them, at zooms where cells end in pixels.
-        Canvas(width, height, ground, crisp=count > 1),
+        Canvas(width, height, background if is_opaque else None, crisp=count > 1),
         np.full(count, Kind.FILL, np.int32),
-        starts_of(np.array([sum(map(len, ring)) for ring in contours], np.int32)),
+        starts_of(np.array([3 * sum(map(len, rings)) for rings in shapes], np.int32)),
         np.full(count, Basis.CUBIC, np.int32),
-        starts=starts_of(np.array([len(points) for points in flat], np.int32)),
-        closed=np.ones(len(flat), np.int32),
-        points=np.concatenate([*flat, np.empty((0, 2))]).astype(np.float32),
+        starts=starts_of(np.array([len(points) for points in contours], np.int32)),
+        closed=np.ones(len(contours), np.int32),
+        points=np.concatenate([*contours, np.empty((0, 2))]).astype(np.float32),
         colors=palette[:, :3],
         opacities=np.ones(count, np.float32) if is_opaque else palette[:, 3],
         rule=np.full(count, Rule.EVENODD, np.int32),

@@ -13,19 +13,15 @@ from warpsplat.drawing.trace.grids import Bools, Floats, Ints
 from warpsplat.drawing.trace.seeds import ROUNDING
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
-from warpsplat.portable.linear import eigh, product, solve, solve_banded
+from warpsplat.portable.linear import eigh, product, solve
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Paint
 from warpsplat.scene.attributes import GRADIENTS
 
 SAMPLES = 4000  # pixels of a region that a ramp is fitted to, at the most
-LEAST_SLOPES = 8  # pixels where the slope is known, at the least
-RADIAL_HANDICAP = 0.1  # by which the residual of a radial gradient must be smaller, over that of a linear one
 SPAN = 3  # [px] over which the slope is taken, to each side
-BLUR = 1.5  # [px] standard deviation of the filter before that
-BINS = 48  # places along a ramp where its colour is measured, at the most
-BIN = 1.0  # [px] how far apart these are, at least
-STIFFNESS = 1e-6  # weight of the squared second differences of knots, for each pixel
+BLUR = 1.5  # [px] standard deviation of the filter before slopes and tones are taken
+BINS = 48  # places along a ramp where its colour is measured, at the most; they are a pixel apart at least
 MOST_STOPS = 8
 
 Gradients = Sequence[Paint]
@@ -66,7 +62,7 @@ def fit_ramp(
     if not gradients:
         return None
     places, slopes = _slopes(image, mask)
-    if len(places) < LEAST_SLOPES or not np.abs(slopes).max():
+    if not slopes.any():
         return None
     rows, columns = _sampled(mask)
     points = np.stack([columns, rows], axis=1) + 0.5
@@ -75,7 +71,7 @@ def fit_ramp(
     center = _center(places, slopes) if Paint.RADIAL in gradients else None
     if center is not None:
         radial = _radial(points, colors, center)
-        if best is None or radial.residual * (1 + RADIAL_HANDICAP) < best.residual:
+        if best is None or radial.residual < best.residual:
             best = radial
     return best and replace(best, frame=best.frame + np.array([left, top, 0, 0, 0, 0], np.float64))
 
@@ -91,8 +87,6 @@ def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
     """Return where the slope of the image is known, shape (n, 2), and it by channel, (n, 2, channel)."""
     sure = cv2.erode(mask.astype(np.uint8), np.ones((2 * SPAN + 1,) * 2, np.uint8), borderValue=0) > 0
     y, x = _sampled(sure)
-    if len(y) < LEAST_SLOPES:  # as in thin bands
-        return np.zeros((0, 2)), np.zeros((0, 2, 1))
     soft = filters.blurred_within(image, mask, BLUR)
     slope_x = (soft[y, x + SPAN] - soft[y, x - SPAN]) / (2 * SPAN)
     slope_y = (soft[y + SPAN, x] - soft[y - SPAN, x]) / (2 * SPAN)
@@ -101,9 +95,7 @@ def _slopes(image: Floats, mask: Bools) -> tuple[Floats, Floats]:
 
 def _linear(points: Floats, colors: Floats, slopes: Floats) -> Ramp:
     """Return a gradient along the principal direction of the slopes."""
-    x, y = slopes[:, 0], slopes[:, 1]
-    mixed = (x * y).sum()
-    direction = eigh([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])[1][:, 1]
+    direction = eigh(_squares(slopes.swapaxes(1, 2)))[1][:, 1]
     along = product(points, direction)
     low, high = float(along.min()), float(along.max())
     length = max(high - low, 1e-3)
@@ -118,13 +110,16 @@ def _center(places: Floats, slopes: Floats) -> Floats | None:
     """Return the point that all slopes point to or away from; None where they are parallel."""
     normals = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)  # (n, channel, 2)
     away = (normals * places[:, None]).sum(axis=-1)
-    x, y = normals[..., 0], normals[..., 1]
-    mixed = (x * y).sum()
-    matrix = np.array([[(x * x).sum(), mixed], [mixed, (y * y).sum()]])
+    matrix = _squares(normals)
     least, most = eigh(matrix)[0]
     if most >= 1e4 * least:
         return None
-    return solve(matrix, np.array([(x * away).sum(), (y * away).sum()]))
+    return solve(matrix, (normals * away[..., None]).sum(axis=(0, 1)))
+
+
+def _squares(vectors: Floats) -> Floats:
+    """Return the sum of the outer products of vectors (..., 2) with themselves, shape (2, 2)."""
+    return (vectors[..., :, None] * vectors[..., None, :]).sum(axis=tuple(range(vectors.ndim - 1)))
 
 
 def _radial(points: Floats, colors: Floats, center: Floats) -> Ramp:
@@ -139,47 +134,25 @@ def _profile(t: Floats, length: float, colors: Floats) -> tuple[Floats, Floats, 
 
     ``length``: of the ramp [px].
     """
-    knots = np.linspace(0, 1, 1 + min(max(int(length / BIN), 1), BINS))
-    fine = _least_squares(t, colors, knots)
-    seen = np.histogram(t, knots)[0]
-    known = np.concatenate([[True], (seen[1:] + seen[:-1]) > 0, [True]])
-    offsets = _fewest(knots[known], fine[known])
-    stops = _least_squares(t, colors, offsets)
-    residual = float(np.sqrt(np.mean((interp(t, offsets, stops) - colors) ** 2)))
+    bins = min(max(int(length), 1), BINS)
+    which = np.unique(np.minimum(t * bins, bins - 1).astype(np.intp), return_inverse=True)[1]
+    means = [np.bincount(which, values) / np.bincount(which) for values in (t, *colors.T)]
+    offsets = _fewest(means[0], np.stack(means[1:], axis=1))
+    weights = interp(t, offsets, np.eye(len(offsets)))
+    squares = product(weights.T, weights) + 1e-9 * np.eye(len(offsets))
+    stops = solve(squares, product(weights.T, colors))
+    residual = float(np.sqrt(np.mean(np.square(product(weights, stops) - colors))))
     return offsets, np.clip(stops, 0, 255), residual
 
 
-def _least_squares(t: Floats, colors: Floats, knots: Floats) -> Floats:
-    """Return values at ``knots`` of the broken line nearest to the colours, a little stiff where none are."""
-    low = np.clip(np.searchsorted(knots, t, "right") - 1, 0, len(knots) - 2)
-    share = (t - knots[low]) / (knots[low + 1] - knots[low])
-    count = len(knots)
-
-    def sums(weights: Floats) -> Floats:
-        return np.asarray(np.bincount(low, weights, count), np.float64)
-
-    # A colour is a mixture of two neighbouring knots, so that the normal equations have three diagonals, and
-    # five with the second differences.
-    beside = sums(share * (1 - share))[:-1]
-    here = sums((1 - share) ** 2) + np.roll(sums(share**2), 1)
-    right = np.stack([sums((1 - share) * c) + np.roll(sums(share * c), 1) for c in colors.T], axis=1)
-    here += 1e-9
-    stiff = STIFFNESS * len(t)
-    for first, times in enumerate((1, 4, 1)):
-        here[first : count - 2 + first] += times * stiff
-    beside[:-1] -= 2 * stiff
-    beside[1:] -= 2 * stiff
-    return solve_banded([here, beside, np.full(count - 2, stiff)], right)
-
-
-def _fewest(knots: Floats, values: Floats) -> Floats:
-    """Return the knots that a broken line near the values needs (Douglas and Peucker)."""
-    chosen = {0, len(knots) - 1}
+def _fewest(places: Floats, values: Floats) -> Floats:
+    """Return 0, 1 and the places between that a broken line near the values needs (Douglas and Peucker)."""
+    chosen = {0, len(places) - 1}
     while len(chosen) < MOST_STOPS:
         order = sorted(chosen)
-        off = np.abs(interp(knots, knots[order], values[order]) - values).max(axis=1)
+        off = np.abs(interp(places, places[order], values[order]) - values).max(axis=1)
         worst = int(off.argmax())
         if off[worst] <= ROUNDING:
             break
         chosen.add(worst)
-    return np.asarray(knots[sorted(chosen)])
+    return np.concatenate([[0.0], places[sorted(chosen)[1:-1]], [1.0]])

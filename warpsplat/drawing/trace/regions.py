@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.assign import fill_gaps, with_main_color, without_specks
+from warpsplat.drawing.trace.assign import fill_gaps, without_specks
 from warpsplat.drawing.trace.bands import split_uneven
 from warpsplat.drawing.trace.grids import Floats, Ints, components, unchecked
 from warpsplat.drawing.trace.palette import Coloring, paint_parts
@@ -72,12 +72,9 @@ def find_regions(
     check()
     parts = add_thin_parts(image, parts, noise)
     check()
-    parts = with_main_color(image, parts, noise)
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = without_specks(image, *fill_gaps(image, parts), noise, price)
-    labels = components(painted, image)
-    paint = np.zeros(int(labels.max()) + 1, np.int32)
-    paint[labels] = painted
+    labels, paint = components(painted, image)
     return Regions(image, labels, fills, paint, parts.colorings, noise)
 
 

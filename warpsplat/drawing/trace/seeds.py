@@ -6,7 +6,6 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import (
     NO_REGION,
-    Bools,
     Floats,
     Ints,
     channel_max,
@@ -92,15 +91,7 @@ def find_seeds(image: Floats, noise: float) -> Ints:
     across &= clear[:, 1:] == clear[:, :-1]
     down &= clear[1:] == clear[:-1]
     count, parts = linked_components(across, down, flat | even)
-    return _without_tiny(parts, count, flat)
-
-
-def _without_tiny(parts: Ints, count: int, flat: Bools) -> Ints:
-    """Return the labels without parts that are too small, numbered again without gaps."""
-    if count == 0:
-        return parts
-    inside = parts >= 0
-    sizes = np.bincount(parts[inside], minlength=count)
+    sizes = np.bincount(parts[parts >= 0], minlength=count)
     keep = (sizes >= LEAST_RAMP) | (np.bincount(parts[flat], minlength=count) > 0)
-    number = np.where(keep, np.cumsum(keep) - 1, NO_REGION).astype(np.int32)
-    return np.where(inside, number[parts], NO_REGION)
+    # NO_REGION is the last.
+    return np.append(np.where(keep, np.cumsum(keep) - 1, NO_REGION), NO_REGION).astype(np.int32)[parts]

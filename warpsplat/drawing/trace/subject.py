@@ -148,7 +148,7 @@ codes have 0.19 or less, icons and photographs of 16 to 256 px 0.21 or more."""
 
 def _cells(image: FloatArray) -> str | None:
     """Return what the cells of pixel art are like that explain an image; None if none do."""
-    across, down = changes(image, _levels)
+    across, down = changes(_levels(image))
     size = int(np.gcd.reduce(np.concatenate([across, down])))
     sides = image.shape[0] // size, image.shape[1] // size
     if (len(across) - 1) * (len(down) - 1) <= MOST_CELLS:
@@ -165,7 +165,9 @@ def _cells(image: FloatArray) -> str | None:
     lattice = find_lattice(_levels(image).astype(np.uint8))
     if lattice is None or not _has_hard_corners(lattice.palette[lattice.colors]):
         return None
-    return f"{lattice.colors.shape[1]}x{lattice.colors.shape[0]} cells of {lattice.columns.period:.3g} px"
+    return (
+        f"{lattice.colors.shape[1]}x{lattice.colors.shape[0]} cells of {np.diff(lattice.across).max():.3g} px"
+    )
 
 
 def _has_hard_corners(cells: Ints) -> bool:
