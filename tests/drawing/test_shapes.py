@@ -19,7 +19,6 @@ from tests.drawing.drawings import (
     star,
 )
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.line_art import with_near_merged
 from warpsplat.drawing.shapes import FAMILIES, Family, distances, nearest
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.fit.problem import Run
@@ -103,11 +102,6 @@ def test_distances_have_signs() -> None:
     points = np.array([[(13.0, 0), (0, -9), (9, 6), (11, 0)]] * 3)
     wanted = [[1, 1, -2, -1], [1, 1, 0.57, -1.04], [1, 1, -2, -1]]
     np.testing.assert_allclose(distances(points, half, radii), wanted, atol=0.1)
-
-
-def test_near_values_are_merged_by_their_weights() -> None:
-    values = with_near_merged(np.array([3.0, 1.0, 1.2, 9.0]), np.array([1.0, 3.0, 1.0, 1.0]), 0.1)
-    np.testing.assert_allclose(values, [3, 1.05, 1.05, 9])
 
 
 def test_equal_outlines_of_a_noisy_image_are_equal() -> None:

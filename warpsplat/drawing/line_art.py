@@ -14,6 +14,7 @@ from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
+from warpsplat.drawing.strokes.pens import grouped
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.thin import THIN_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
@@ -26,7 +27,7 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, FloatArray, IndexArray, Kind, Scene
 from warpsplat.svg.sizes import PATH
 
 STROKE_STEPS = 240
@@ -34,9 +35,6 @@ STROKE_STEPS = 240
 
 STROKE_RATE = 0.12
 """Learning rate of points, and of widths on both sides of a line [px]."""
-
-THIN_STROKE = 1.0
-"""Strokes thinner than this [px] keep their width: it is the minimum of a fit."""
 
 ALIKE = 0.3
 """Difference of the widths of usual strokes up to which one pen drew them [px]."""
@@ -154,43 +152,19 @@ def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
     start = replace(strokes, layer=np.zeros_like(strokes.layer), canvas=canvas)
     settings = _line_settings(problem.settings, len(start))
     made = fit(replace(problem, settings=settings), run, Start(scene=start))
-    widths = np.where(strokes.widths < THIN_STROKE, strokes.widths, made.scene.widths)
+    (thinnest,) = (attribute.low[0] for attribute in ATTRIBUTES if attribute.name == "widths")  # of a fit
+    widths = np.where(strokes.widths < thinnest, strokes.widths, made.scene.widths)
     found = replace(made.scene, widths=widths, canvas=strokes.canvas, layer=strokes.layer)
     return replace(made, scene=with_equal_widths(found))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:
     """Return strokes of which those that are about as wide have one width."""
-    if not len(strokes):
-        return strokes
     widths = strokes.widths.astype(np.float64)
     lengths = lengths_of(strokes) + widths
-    merged = with_near_merged(widths, lengths / lengths.mean(), ALIKE * ALIKE / 2)
-    return replace(strokes, widths=merged.astype(np.float32))
-
-
-def with_near_merged(values: Floats, stiffness: Floats, price: float) -> Floats:
-    """Return values, near ones replaced by their mean.
-
-    Args:
-        values: Shape (value,).
-        stiffness: Cost of the square of each one's change.
-        price: Most that merging two groups may cost.
-    """
-    order = np.argsort(values, kind="stable")
-    mean, weight, size = values[order], np.maximum(stiffness[order], 1e-30), np.ones(len(values), np.intp)
-    while len(mean) > 1:
-        cost = np.diff(mean) ** 2 * weight[1:] * weight[:-1] / (weight[1:] + weight[:-1])
-        k = int(cost.argmin())
-        if cost[k] > price:
-            break
-        mean[k] = (mean[k] * weight[k] + mean[k + 1] * weight[k + 1]) / (weight[k] + weight[k + 1])
-        weight[k] += weight[k + 1]
-        size[k] += size[k + 1]
-        mean, weight, size = (np.delete(x, k + 1) for x in (mean, weight, size))
-    found = np.empty_like(values)
-    found[order] = np.repeat(mean, size)
-    return found
+    group = grouped(widths[:, None], lengths, ALIKE)
+    means = np.bincount(group, lengths * widths) / np.bincount(group, lengths)
+    return replace(strokes, widths=means[group].astype(np.float32))
 
 
 def lengths_of(strokes: Scene) -> Floats:

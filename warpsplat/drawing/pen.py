@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from warpsplat.drawing.line_art import STROKE_STEPS, lengths_of, refined
+from warpsplat.drawing.line_art import STROKE_STEPS, refined
 from warpsplat.drawing.picture import MARGIN
 from warpsplat.drawing.prices import CUBIC, LINE, MOVE
 from warpsplat.drawing.strokes.broad import OFF
@@ -19,7 +19,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import IndexArray, Kind, Paint, Scene
+from warpsplat.scene import FloatArray, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.data import cubic_rows
 from warpsplat.svg.sizes import PATH
@@ -33,12 +33,71 @@ SLENDER = 17.0
 
 def with_strokes(scene: Scene, settings: Settings, run: Run) -> Scene:
     """Return a drawing with strokes in place of fills, or parts of them, of even width with round ends."""
-    may_be_drawn = (scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT)
     done = scene.take(np.zeros(0, np.intp))
-    for i, is_flat in enumerate(may_be_drawn.tolist()):
+    for i, is_flat in enumerate(((scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT)).tolist()):
         shape = scene.take(np.array([i]))
-        done = done.append(_drawn(shape, settings, run) if is_flat and _is_slender(shape) else shape)
+        done = done.append(_drawn(shape, settings, run) if is_flat else shape)
     return replace(done, layer_names=scene.layer_names)
+
+
+def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
+    """Return a fill as strokes, and what is left of it."""
+    part, strokes = _parts(shape, run), shape.take(np.zeros(0, np.intp))
+    left = np.ones(len(part), np.bool_)
+    for number in np.unique(part).tolist():
+        found = _as_strokes(_having(shape, part == number), settings, run)
+        if found is not None:
+            left &= part != number
+            strokes = strokes.append(found)
+    return _having(shape, left).append(strokes)
+
+
+def _alone(shape: Scene, run: Run) -> tuple[Scene, FloatArray, Bools]:
+    """Return a fill in black on a white canvas of its own, its picture, and the mask of its ink."""
+    low = np.floor(shape.points.min(axis=0)).astype(np.float32) - MARGIN
+    width, height = (np.ceil(shape.points.max(axis=0)) + MARGIN - low).astype(np.intp).tolist()
+    canvas = replace(shape.canvas, width=width, height=height, background=np.ones(3, np.float32))
+    points, black = shape.points - low, np.zeros((1, 3), np.float32)
+    alone = replace(shape, canvas=canvas, points=points, colors=black, opacities=np.ones(1, np.float32))
+    shown = render(alone, backend=run.backend)
+    cover = 1 - shown[..., 0]
+    return alone, shown, with_thin(cover > 0.5, middles(across(cover), FAINT))
+
+
+def _parts(shape: Scene, run: Run) -> IndexArray:
+    """Return the number of the connected part of a fill that each contour bounds, shape (contour,)."""
+    alone, _, mask = _alone(shape, run)
+    labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)[1]
+    # The pixels beside a mask belong to it, too.
+    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.intp)
+    contours = (at_pixels(grown, points) for points, _ in alone.contours_of(0))
+    return np.array([np.bincount(numbers[numbers > 0], minlength=1).argmax() for numbers in contours])
+
+
+def _as_strokes(shape: Scene, settings: Settings, run: Run) -> Scene | None:
+    """Return a fill in one part as strokes; None where these are not as near, or no shorter in the file."""
+    if not _is_slender(shape):
+        return None
+    alone, shown, mask = _alone(shape, run)
+    traced = trace_ink(Ink(1 - shown[..., 0], mask, shown, alone.canvas.background), only_lines=True).scene()
+    if not len(traced) or PATH * len(traced) + _size(traced) > _size(shape):
+        return None
+    traced = replace(traced, canvas=alone.canvas, colors=np.zeros_like(traced.colors))
+    quiet = replace(run, on_progress=None, checkpoint=None)
+    problem = Problem(shown, replace(settings, iterations=STROKE_STEPS))
+    strokes = _straight(refined(traced, problem, quiet).scene)
+    off = np.abs(render(strokes, backend=run.backend)[..., 0] - shown[..., 0])
+    if filters.box_sum(off, SPOT_SIDE).max() > SPOT:
+        return None
+    own = shape.take(np.zeros(len(strokes), np.intp))
+    return replace(
+        strokes,
+        canvas=shape.canvas,
+        points=strokes.points + np.round(shape.points[0] - alone.points[0]),
+        colors=own.colors,
+        opacities=own.opacities,
+        layer=own.layer,
+    )
 
 
 def _is_slender(shape: Scene) -> bool:
@@ -49,56 +108,6 @@ def _is_slender(shape: Scene) -> bool:
         length += float(hypot(x - np.roll(x, 1), y - np.roll(y, 1)).sum())
         area += float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum()) / 2
     return length * length > SLENDER * abs(area)
-
-
-def _drawn(shape: Scene, settings: Settings, run: Run) -> Scene:
-    """Return a fill as strokes, and what is left of it."""
-    low = np.floor(shape.points.min(axis=0)) - MARGIN
-    width, height = (np.ceil(shape.points.max(axis=0)) + MARGIN - low).astype(np.intp).tolist()
-    white, black = np.ones(3, np.float32), np.zeros((1, 3), np.float32)
-    canvas = replace(shape.canvas, width=width, height=height, background=white)
-    alone = replace(shape, canvas=canvas, points=shape.points - low.astype(np.float32))
-    solid = np.ones_like(shape.opacities)
-    shown = render(replace(alone, colors=black, opacities=solid), backend=run.backend)
-    cover = 1 - shown[..., 0]
-    mask = with_thin(cover > 0.5, middles(across(cover), FAINT))
-    traced = trace_ink(Ink(cover, mask, shown, white), only_lines=True).scene()
-    if not len(traced):
-        return shape
-    traced = replace(traced, canvas=canvas, colors=np.zeros_like(traced.colors))
-    quiet = replace(run, on_progress=None, checkpoint=None)
-    problem = Problem(shown, replace(settings, iterations=STROKE_STEPS))
-    strokes = _straight(refined(traced, problem, quiet).scene)
-    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
-    # What a part covers of the pixels beside its mask belongs to it.
-    grown = cv2.dilate(labels.astype(np.float32), np.ones((3, 3), np.uint8))
-    parts: IndexArray = np.asarray(grown, np.intp)
-    part, outline_part = _parts_of(parts, count, strokes), _parts_of(parts, count, alone)
-    lengths = lengths_of(strokes)
-    length: Floats = np.bincount(part, lengths, count).astype(np.float64)
-    area = np.bincount(part, lengths * strokes.widths, count)
-    then, before = (
-        np.bincount(owner, sizes, count)
-        for owner, sizes in ((part, PATH + _sizes(strokes)), (outline_part, _sizes(alone)))
-    )
-    off = np.abs(render(strokes, backend=run.backend)[..., 0] - shown[..., 0])
-    worst = np.zeros(count, np.float32)
-    np.maximum.at(worst, parts.ravel(), filters.box_sum(off, SPOT_SIDE).ravel())
-    gone = (worst <= SPOT) & (length * length > area) & (then <= before)  # dots stay
-    gone[0] = False
-    chosen = np.flatnonzero(gone[part])
-    if not len(chosen):
-        return shape
-    strokes = strokes.take(chosen)
-    strokes = replace(
-        strokes,
-        canvas=shape.canvas,
-        points=strokes.points + low.astype(np.float32),
-        colors=np.repeat(shape.colors, len(chosen), axis=0),
-        opacities=np.repeat(shape.opacities, len(chosen)),
-        layer=np.repeat(shape.layer, len(chosen)),
-    )
-    return _having(shape, ~gone[outline_part]).append(strokes)
 
 
 def _straight(strokes: Scene) -> Scene:
@@ -121,22 +130,11 @@ def _is_straight(points: Floats, rows: IndexArray) -> Bools:
     return np.asarray(np.maximum(*across) < OFF * np.maximum(hypot(*chord.T), 1e-9), np.bool_)
 
 
-def _sizes(scene: Scene) -> Floats:
-    """Return the bytes of the data of each contour, shape (contour,)."""
+def _size(scene: Scene) -> float:
+    """Return the bytes of the data of all contours."""
     rows = cubic_rows(scene)
-    pieces = np.where(_is_straight(scene.points.astype(np.float64), rows), LINE, CUBIC)
-    owner = np.searchsorted(scene.starts, rows[:, 0], side="right") - 1
-    return np.asarray(MOVE + np.bincount(owner, pieces, len(scene.starts) - 1), np.float64)
-
-
-def _parts_of(parts: IndexArray, count: int, scene: Scene) -> IndexArray:
-    """Return the part, of ``count``, that most points of each contour are in, shape (contour,)."""
-    contours = len(scene.starts) - 1
-    owner = np.repeat(np.arange(contours), np.diff(scene.starts))
-    votes = np.bincount(owner * count + at_pixels(parts, scene.points), minlength=contours * count)
-    votes = votes.reshape(contours, count)
-    votes[:, 0] = 0
-    return votes.argmax(axis=1)
+    straight = _is_straight(scene.points.astype(np.float64), rows)
+    return MOVE * len(scene.closed) + float(np.where(straight, LINE, CUBIC).sum())
 
 
 def _having(shape: Scene, chosen: Bools) -> Scene:

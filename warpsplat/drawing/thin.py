@@ -28,23 +28,16 @@ def margins(image: FloatArray, thin: int) -> tuple[int, int]:
 
 def continued(image: FloatArray, across: int, down: int) -> FloatArray:
     """Return an image whose outermost pixels are repeated beyond its borders, by so many columns and rows."""
-    if not (across or down):
-        return image
-    return np.ascontiguousarray(np.pad(image, ((down, down), (across, across), (0, 0)), mode="edge"))
+    return np.pad(image, ((down, down), (across, across), (0, 0)), mode="edge")
 
 
 def cut(scene: Scene, across: int, down: int) -> Scene:
     """Return the scene of a continued image on the canvas of the image itself, beyond which shapes reach."""
     shift = np.array([across, down], np.float32)
     width, height = scene.canvas.width - 2 * across, scene.canvas.height - 2 * down
-    frames = scene.frames.copy()
-    frames[:, :2] -= shift
-    return replace(
-        scene,
-        canvas=replace(scene.canvas, width=width, height=height),
-        points=scene.points - shift,
-        frames=frames,
-    )
+    canvas = replace(scene.canvas, width=width, height=height)
+    frames = np.concatenate([scene.frames[:, :2] - shift, scene.frames[:, 2:]], axis=1)
+    return replace(scene, canvas=canvas, points=scene.points - shift, frames=frames)
 
 
 def best_of_thin(first: Fit, others: Sequence[Callable[[], Fit]]) -> Fit:
@@ -53,6 +46,5 @@ def best_of_thin(first: Fit, others: Sequence[Callable[[], Fit]]) -> Fit:
     for draw in others:
         if best.render_psnr >= TRACED_PSNR:
             break
-        made = draw()
-        best = made if made.render_psnr > best.render_psnr else best
+        best = max(best, draw(), key=lambda made: made.render_psnr)
     return best

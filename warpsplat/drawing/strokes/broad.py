@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.strokes.ink import WIDEST, Ink
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, bounding_boxes, depth, dilated, eroded
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, bounding_boxes, depth, dilated
 from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray
@@ -42,14 +42,8 @@ class Areas:
     """Share of each pixel that areas cover, shape (height, width)."""
 
     def places(self) -> list[Floats]:
-        """Return pixels of each area that show its colour, shape (pixel, 2)."""
-        return [_inner(self.labels == number) for number in range(1, int(self.labels.max()) + 1)]
-
-
-def _inner(inside: Bools) -> Floats:
-    """Return the pixels of a mask without its edge, whose colour is mixed; all of it if that leaves none."""
-    inner = eroded(inside, 5)
-    return np.asarray(np.argwhere(inner if inner.any() else inside)[:, ::-1] + 0.5)
+        """Return the pixels of each area, shape (pixel, 2)."""
+        return [np.argwhere(self.labels == n)[:, ::-1] + 0.5 for n in range(1, int(self.labels.max()) + 1)]
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,6 @@ class Ink:
     """The image without transparency, sRGB in [0, 1], shape (height, width, 3)."""
     paper: FloatArray | None
     """The paper's colour, sRGB in [0, 1], shape (3,); None: transparent."""
-    textured: bool = False
-    """Whether crayons leave what cannot be told from thin lines and dots."""
 
 
 SEED = 0.35  # contrast that a line must reach somewhere, over that of strong ink
@@ -35,7 +33,12 @@ FULL = 0.9  # least contrast of full ink, over that of strong ink
 FAINTEST, FAINTEST_NOISE = 0.07, 5.0
 """Least contrast of ink with the paper around it, in [0, 1], and in standard deviations of the noise."""
 
-WINDOW = 9  # [px] side of the window in which ink is compared with the strongest beside it
+WIDEST, LEAST_WIDEST = 0.05, 25
+"""Width of the broadest line, over the longer side of the image, and at the least [px]: what is broader is
+paper of another colour, or an area."""
+
+WINDOW = 9
+"""Side of the window in which ink is compared with the strongest beside it; thin tips cover fewer pixels."""
 
 
 def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
@@ -48,41 +51,31 @@ def find_ink(image: FloatArray, *, mixed: bool = False) -> Ink:
     shown, is_clear = _on_paper(image)
     paper = _median_color(shown).astype(np.float32)
     light = 1 - shown if paper.mean() < 0.4 else shown
-    small = _reduced(light)
-    is_textured = _is_colored_in(small)
-    contrast = _contrast(light, small, in_all=is_textured)
+    channels = _with_solid(_contrasts(light), light, mixed=mixed)
+    contrast, most = channels.mean(axis=2), channels.max(axis=2)
     noise = _noise(contrast)
     floor = max(FAINTEST, FAINTEST_NOISE * noise)
-    dark = contrast[contrast > floor]
-    strong = float(np.percentile(dark, 90)) if len(dark) else 1.0
-    contrast = _with_solid(contrast, light, strong, in_all=is_textured and not mixed)
+    strong = _strong(contrast, floor)
     seed = max(floor, SEED * strong)
     strongest = cv2.dilate(contrast, np.ones((WINDOW, WINDOW), np.uint8))
     mask = contrast > np.maximum(0.5 * np.maximum(strongest, seed), floor)
-    seeds = contrast > seed
-    if is_textured:
-        mask = _without_specks(mask, seeds, 0.9)
-    else:
-        mass = across(contrast / np.float32(strong))
-        faint = max(FAINT, FAINTEST_NOISE * noise / strong)
-        mask = _without_specks(with_thin(mask, middles(mass, faint)), seeds | (mass > 2 * faint))
-    full = cv2.dilate(np.where(mask, contrast, 0), np.ones((LEAST_WIDEST, LEAST_WIDEST), np.uint8))
+    mass = across(contrast / np.float32(strong))
+    faint = max(FAINT, FAINTEST_NOISE * noise / strong)
+    mask = _without_specks(with_thin(mask, middles(mass, faint)), (contrast > seed) | (mass > 2 * faint))
+    full = cv2.dilate(np.where(mask, most, 0), np.ones((LEAST_WIDEST, LEAST_WIDEST), np.uint8))
     # Ink that is lighter than elsewhere is thinner than a pixel, to some extent.
-    full = np.maximum(filters.box_blur(full, WINDOW), FULL * strong)
-    cover = np.where(dilated(mask, 5) & (contrast > 0.5 * floor), np.clip(contrast / full, 0, 1), 0)
+    full = np.maximum(filters.box_blur(full, WINDOW), FULL * _strong(most, floor))
+    cover = np.where(dilated(mask, 5) & (contrast > 0.5 * floor), np.clip(most / (full - 2 * noise), 0, 1), 0)
     cover[eroded(mask, 5)] = 1
-    return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper, is_textured)
-
-
-CLEAR = 0.02  # share of clear pixels from which on an image has no paper
+    return Ink(cover.astype(np.float32), mask, shown, None if is_clear else paper)
 
 
 def _on_paper(image: FloatArray) -> tuple[FloatArray, bool]:
-    """Return the image on white, or on black where its ink is light, and whether its paper is clear."""
+    """Return the image on white, or on black where its ink is light, and whether its border is clear."""
     if image.shape[2] == 3:
         return np.asarray(image, np.float32), False
     opacity = image[..., 3:]
-    is_clear = bool((opacity < 0.5).mean() > CLEAR)
+    is_clear = bool(np.median(np.concatenate([opacity[[0, -1]].ravel(), opacity[:, [0, -1]].ravel()])) < 0.5)
     light = float(image[..., :3].sum() / max(3 * float(opacity.sum()), 1e-6))
     behind = 0.0 if is_clear and light > 0.7 else 1.0
     return np.asarray(image[..., :3] + (1 - opacity) * behind, np.float32), is_clear
@@ -93,68 +86,30 @@ def _median_color(image: FloatArray) -> FloatArray:
     return np.asarray(np.median(image.reshape(-1, 3)[:: max(1, image.size // 300_000)], axis=0))
 
 
-REDUCED = 512  # [px] longer side of the image that the paper is looked for in, about
+def _contrasts(light: FloatArray) -> FloatArray:
+    """Return how much darker than the paper around it each pixel is, shape (height, width, 3)."""
+    side = 2 * round(max(LEAST_WIDEST, WIDEST * max(light.shape[:2])) / 2) + 1
+    levels = np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
+    return np.clip(cv2.medianBlur(levels, side) / np.float32(255) - light, 0, 1)
 
 
-def _reduced(light: FloatArray) -> FloatArray:
-    """Return the image at the size that its paper is looked for in."""
-    height, width = light.shape[:2]
-    factor = max(1, round(max(height, width) / REDUCED))
-    return filters.resize_area(light, (max(1, width // factor), max(1, height // factor)))
+def _strong(contrast: FloatArray, floor: float) -> float:
+    """Return the contrast of strong ink."""
+    dark = contrast[contrast > floor]
+    return float(np.percentile(dark, 90)) if len(dark) else 1.0
 
 
-WIDEST, LEAST_WIDEST = 0.05, 25
-"""Width of the broadest line, over the longer side of the image, and at the least [px]: what is broader is
-paper of another colour, or an area."""
+def _with_solid(channels: FloatArray, light: FloatArray, *, mixed: bool) -> FloatArray:
+    """Return the contrasts with the paper of the whole image where that is as strong as in lines.
 
-
-def _contrast(light: FloatArray, small: FloatArray, *, in_all: bool) -> FloatArray:
-    """Return how much darker than the paper around it each pixel is, shape (height, width).
-
-    Args:
-        light: The image on light paper.
-        small: The same, reduced.
-        in_all: Whether in each channel, not only in the one that shows it most: what is coloured in has a
-            texture that shows in some channels; its outlines show in all.
+    What is broad and as dark as ink is no paper; if ``mixed``, nor is what is as strong in any channel.
     """
-    height, width = light.shape[:2]
-    broad = max(LEAST_WIDEST, WIDEST * max(height, width)) * small.shape[1] / width
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(broad / 2) + 1,) * 2)
-    paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, kernel, borderType=cv2.BORDER_REPLICATE)
-    # The edge of what is coloured broadly is no line, although the reduced image blurs it.
-    paper = cv2.erode(paper, np.ones((3, 3), np.uint8))
-    contrast = np.clip(filters.resize_linear(paper, (width, height)) - light, 0, 1)
-    return _most(contrast, in_all=in_all)
-
-
-def _most(contrast: FloatArray, *, in_all: bool) -> FloatArray:
-    """Return the contrast in the channel that shows it most; or least, to be in all of them."""
-    return np.asarray(contrast.min(axis=2) if in_all else contrast.max(axis=2), np.float32)
-
-
-def _with_solid(contrast: FloatArray, light: FloatArray, strong: float, *, in_all: bool) -> FloatArray:
-    """Return the contrast with the paper of the whole image where that is as strong as in lines, or anywhere.
-
-    What is broad and as dark as ink is no paper.
-    """
-    whole = _most(np.clip(_median_color(light) - light, 0, 1), in_all=in_all)
-    lines = contrast > 0.5 * strong
-    solid = whole > FULL * float(np.median(whole[lines]) if lines.any() else max(whole.max(), FAINTEST))
+    whole = np.clip(_median_color(light) - light, 0, 1)
+    lines = channels.mean(axis=2) > 0.5 * _strong(channels.mean(axis=2), FAINTEST)
+    ink = np.median(whole[lines], axis=0) if lines.any() else np.maximum(whole.max(axis=(0, 1)), FAINTEST)
+    solid = whole.max(axis=2) > FULL * ink.max() if mixed else (whole >= FULL * ink).all(axis=2)
     # With its edge, whose pixels are mixed.
-    return np.asarray(np.where(dilated(solid, 3), np.maximum(contrast, whole), contrast), np.float32)
-
-
-TINT, TINTED = 0.05, 0.05
-"""How far a channel of an area that is coloured in differs from the paper more than the others, and the share
-of such areas from which on an image is coloured in."""
-
-
-def _is_colored_in(small: FloatArray) -> bool:
-    """Return whether areas of the image, not only lines, have a colour of their own."""
-    areas = cv2.medianBlur((255 * np.clip(small, 0, 1)).astype(np.uint8), 15) / np.float32(255)
-    away = areas - np.median(areas.reshape(-1, 3), axis=0)
-    tint = np.abs(away - away.mean(axis=2, keepdims=True)).max(axis=2)
-    return bool((tint > TINT).mean() > TINTED)
+    return np.where(dilated(solid, 3)[..., None], np.maximum(channels, whole), channels)
 
 
 def _noise(contrast: FloatArray) -> float:
@@ -163,15 +118,11 @@ def _noise(contrast: FloatArray) -> float:
     return float(np.median(np.abs(rough))) / (0.6745 * 6)
 
 
-def _without_specks(mask: Bools, seeds: Bools, least: float = 0.0) -> Bools:
-    """Return the parts of ``mask`` of more than a pixel with seeds, without pinholes.
-
-    ``least``: share of seeds that a part must have more of.
-    """
+def _without_specks(mask: Bools, seeds: Bools) -> Bools:
+    """Return the parts of ``mask`` of more than a pixel with seeds, without pinholes."""
     half_width = float(mask.sum()) / max(1, int((mask & ~eroded(mask, 3)).sum()))
     _, parts, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    sizes = stats[:, cv2.CC_STAT_AREA]
-    held = (sizes > 1) & (np.bincount(parts[seeds], minlength=len(sizes)) > least * sizes)
+    held = (stats[:, cv2.CC_STAT_AREA] > 1) & (np.bincount(parts[seeds], minlength=len(stats)) > 0)
     held[0] = False
     inked = held[parts]
     _, parts, stats, _ = cv2.connectedComponentsWithStats((~inked).astype(np.uint8), connectivity=4)
@@ -184,8 +135,6 @@ SPREAD = 0.8  # [px] standard deviation of the filter by which ink across lines 
 
 FAINT = 0.12
 """Ink across a line from which on it goes on; it must have twice as much somewhere [px of full ink]."""
-
-LONG = 5  # [px] of a thin line that goes on from one place only, at the least
 
 
 def across(ink: FloatArray, fine: int = 1) -> FloatArray:
@@ -236,6 +185,6 @@ def with_thin(mask: Bools, thin: Bools, fine: int = 1) -> Bools:
     pairs = np.stack([np.broadcast_to(links[rows, columns], beside.shape), beside], axis=-1).reshape(-1, 2)
     pairs = np.unique(pairs[pairs[:, 1] > 0], axis=0)
     held = np.bincount(pairs[:, 0], minlength=count) > 1
-    held |= stats[:, cv2.CC_STAT_AREA] >= LONG * fine * fine
+    held |= stats[:, cv2.CC_STAT_AREA] >= WINDOW * fine * fine
     held[0] = False
     return np.asarray(mask | held[links], np.bool_)

@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from warpsplat.drawing.strokes.broad import Areas, Split, distance_from, split
-from warpsplat.drawing.strokes.chains import find_chains, smoothed, traced, with_crossings
+from warpsplat.drawing.strokes.chains import find_chains, smoothed, with_crossings
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.pens import find_pens, line_colors
 from warpsplat.drawing.strokes.skeleton import find_graph
@@ -23,7 +23,6 @@ from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.scene import starts_of
 
 TOLERANCE = 0.4  # [px] largest distance of a centre line from its curve
-THINNEST = 0.3  # [px] width of a stroke, at the least
 FINE_PIXELS = 1_000_000  # of the largest image whose ink is thinned at twice the size
 
 
@@ -38,12 +37,6 @@ class CenterLine:
     """Row of the pens' colours."""
     width: float = 0.0
     """[px]"""
-
-    def polyline(self) -> Polyline:
-        """Return the line as curves are fitted to it."""
-        if self.closed:
-            return Polyline(self.points, True)
-        return Polyline(self.points[1:-1], False, self.points[0], self.points[-1])
 
 
 @dataclass(frozen=True)
@@ -62,7 +55,12 @@ class TracedLines:
 
     def scene(self) -> Scene:
         """Return the lines as opaque strokes; ``layer`` is the pen of each."""
-        runs = [line.polyline() for line in self.lines]
+        runs = [
+            Polyline(line.points, True)
+            if line.closed
+            else Polyline(line.points[1:-1], False, line.points[0], line.points[-1])
+            for line in self.lines
+        ]
         unsure = np.ones((1, 1), np.float32)  # how far off centre lines are at corners, anywhere [px]
         fitted = fit_polylines(runs, [TOLERANCE] * len(runs), unsure)
         # Closed chains do not repeat their first point.
@@ -106,14 +104,10 @@ def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> Tra
     pens, owners = find_pens(*line_colors(list(chain.from_iterable(places)), ink))
     bounds = np.cumsum([len(some) for some in places])[:-1]
     edge_pens, ring_pens, area_pens, dot_pens = np.split(owners, bounds)
-    away = None if parts.apart is None else distance_from(parts.apart)
-    lines: list[CenterLine] = []
-    for found in find_chains(graph, edge_pens):
-        line = traced(graph, found)
-        if line is not None:
-            lines.append(CenterLine(line[0] / fine, line[1], found.pen))
-    lines = _measured(lines, parts.thin.cover, THINNEST)
-    if away is not None:
+    lines = [CenterLine(points / fine, closed, pen) for points, closed, pen in find_chains(graph, edge_pens)]
+    lines = _measured(lines, parts.thin.cover)
+    if parts.apart is not None:
+        away = distance_from(parts.apart)
         lines = [joined for line in lines for joined in _joined_to(away, line)]
     for ring, pen in zip(parts.rings, ring_pens.tolist(), strict=True):
         lines.append(CenterLine(*smoothed(ring, closed=True), pen, parts.width))
@@ -146,13 +140,12 @@ def _joined_to(away: Floats, line: CenterLine) -> list[CenterLine]:
     return [replace(line, points=points)]
 
 
-def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> list[CenterLine]:
-    """Return lines with the widths at which they have the ink that is nearest to them.
+def _measured(lines: list[CenterLine], cover: FloatArray) -> list[CenterLine]:
+    """Return lines with the widths at which they have the ink that is nearest to them, if there is any.
 
     Args:
         lines: Of an image.
         cover: Inked share of each pixel, shape (height, width).
-        thinnest: Width of a line, at the least [px].
     """
     if not lines:
         return lines
@@ -166,10 +159,9 @@ def _measured(lines: list[CenterLine], cover: FloatArray, thinnest: float) -> li
     for line, area in zip(lines, ink.tolist(), strict=True):
         length = float(arc_lengths(line.points, closed=line.closed)[-1])
         # An open line has the area of its caps, too.
-        width = (
-            area / length if line.closed else 2 * (math.sqrt(length**2 + math.pi * area) - length) / math.pi
-        )
-        found.append(replace(line, width=max(width, thinnest)))
+        open_width = 2 * (math.sqrt(length * length + math.pi * area) - length) / math.pi
+        if area > 0:
+            found.append(replace(line, width=area / length if line.closed else open_width))
     return found
 
 
@@ -179,7 +171,5 @@ def _enlarged(ink: Ink, factor: int) -> Bools:
     cover = filters.resize_cubic(ink.cover, size)
     held = np.kron(dilated(ink.mask, 3), np.ones((factor, factor), np.bool_))
     inked = ((cover > 0.5) & held) | eroded(np.kron(ink.mask, np.ones((factor, factor), np.bool_)), 3)
-    if ink.textured:
-        return inked
     thin = middles(across(ink.cover, factor), FAINT, factor)
     return with_thin(inked, thin & held, factor)

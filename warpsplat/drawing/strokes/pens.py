@@ -43,28 +43,33 @@ def find_pens(colors: FloatArray, weights: Floats) -> tuple[FloatArray, Ints]:
     """
     if not len(colors):
         return np.zeros((0, 3), np.float32), np.zeros(0, np.intp)
-    places = lab(colors) * np.array([0.5, 1, 1], np.float32)
-    centers = places[_unlike(places, weights)]
-    used = np.bincount(_nearest(places, centers), weights, len(centers))
-    owner = _nearest(places, centers[used >= min(SELDOM * weights.sum(), used.max())])
+    owner = grouped(lab(colors) * np.array([0.5, 1, 1], np.float32), weights, ALIKE, SELDOM * weights.sum())
     order = np.argsort(-np.bincount(owner, weights), kind="stable")
     owner = np.argsort(order, kind="stable")[owner]
     pens = [_weighted_median(colors[owner == pen], weights[owner == pen]) for pen in range(len(order))]
     return np.stack(pens).astype(np.float32), owner
 
 
+def grouped(places: Floats, weights: Floats, alike: float, seldom: float = 0.0) -> Ints:
+    """Return the group of each place: what is nearest to one of those of large weights that are unlike.
+
+    Args:
+        places: Shape (place, n).
+        weights: Shape (place,).
+        alike: Distance up to which two are alike.
+        seldom: Least weight of a group, unless none has more.
+    """
+    centers = np.zeros((0, places.shape[1]))
+    for place in places[np.argsort(-weights, kind="stable")]:
+        if not (np.linalg.norm(centers - place, axis=1) <= alike).any():
+            centers = np.vstack([centers, place])
+    used = np.bincount(_nearest(places, centers), weights, len(centers))
+    return _nearest(places, centers[used >= min(seldom, used.max())])
+
+
 def _nearest(places: Floats, centers: Floats) -> Ints:
     """Return the nearest centre of each place."""
     return np.linalg.norm(places[:, None] - centers[None], axis=2).argmin(axis=1)
-
-
-def _unlike(places: Floats, weights: Floats) -> list[int]:
-    """Return the places that are unlike those of larger weights."""
-    held: list[int] = []
-    for i in np.argsort(-weights, kind="stable").tolist():
-        if not held or np.linalg.norm(places[held] - places[i], axis=1).min() > ALIKE:
-            held.append(i)
-    return held
 
 
 def _weighted_median(values: FloatArray, weights: Floats) -> Floats:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, Sets, at_pixels, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, Sets, depth
 from warpsplat.portable.elementary import hypot
 
-SPUR = 1.5  # how far the ink of a burr reaches, over half the width where it begins, and a pixel
+End = tuple[int, int]
+"""An edge's number, and 0 where it begins or 1 where it ends."""
 
 
 @dataclass
@@ -20,18 +23,19 @@ class Edge:
 
     points: Floats
     """Places [px of the skeleton], with the nodes', shape (point, 2); in a ring the last is the first."""
+    radii: Floats
+    """Half the width of the ink at each [px of the skeleton], shape (point,)."""
     nodes: tuple[int, int]
-    """Where it begins and ends; a ring has a node of its own."""
-    half_width: float
-    """Half the width of the ink along most of it [px of the skeleton]."""
+    """Where it begins and ends; a ring has a node of its own, and so has a lone pixel."""
+
+    @cached_property
+    def half_width(self) -> float:
+        """Half the width of the ink along most of it [px of the skeleton]."""
+        return float(np.median(self.radii))
 
     def length(self) -> float:
         """Return the length in pixels of the skeleton."""
         return float(hypot(*np.diff(self.points, axis=0).T).sum())
-
-    def backwards(self) -> Edge:
-        """Return the same edge from its end."""
-        return replace(self, points=self.points[::-1], nodes=self.nodes[::-1])
 
 
 @dataclass
@@ -43,14 +47,19 @@ class Graph:
     """Shape (node, 2)."""
     radii: Floats
     """Half the width of the ink at each node [px of the skeleton], shape (node,)."""
-    at: list[list[int]] = field(init=False)
-    """Edges at each node; those that begin and end there are named twice."""
+    at: list[list[End]] = field(init=False)
+    """The ends of edges at each node."""
 
     def __post_init__(self) -> None:
         self.at = [[] for _ in self.places]
         for number, edge in enumerate(self.edges):
-            for node in edge.nodes:
-                self.at[node].append(number)
+            for end, node in enumerate(edge.nodes):
+                self.at[node].append((number, end))
+
+    def edge_from(self, end: End) -> Edge:
+        """Return an edge that begins at an end of its."""
+        edge = self.edges[end[0]]
+        return Edge(edge.points[::-1], edge.radii[::-1], edge.nodes[::-1]) if end[1] else edge
 
 
 def find_graph(mask: Bools) -> Graph:
@@ -58,165 +67,115 @@ def find_graph(mask: Bools) -> Graph:
     inside = np.pad(mask.astype(np.uint8), 1)
     radii = np.maximum(depth(mask) - 0.5, 0.5)
     thin = cv2.ximgproc.thinning(255 * inside, thinningType=cv2.ximgproc.THINNING_GUOHALL)[1:-1, 1:-1] > 0
-    return _without_burrs(_graph(thin, radii))
+    graph = _of_pixels(thin, radii)
+    crowded = [len(ends) > 2 for ends in graph.at]
+    inner = [
+        number for number, edge in enumerate(graph.edges) if crowded[edge.nodes[0]] and crowded[edge.nodes[1]]
+    ]
+    return _without_burrs(contracted(graph, inner))
 
 
-def _neighbours(thin: Bools) -> tuple[Ints, list[list[int]]]:
-    """Return the pixels of a skeleton (row, column), and the numbers of the neighbours of each.
+def _of_pixels(thin: Bools, radii: Floats) -> Graph:
+    """Return the graph whose nodes are the pixels of a skeleton, and whose edges lead to their neighbours.
 
     A diagonal neighbour counts only where no straight step leads to a neighbour of both.
     """
-    # The straight steps first.
-    steps = sorted(itertools.product((-1, 0, 1), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))[1:]
     padded = np.pad(thin, 1)
     number = np.full(padded.shape, -1, np.int64)
-    pixels = np.argwhere(padded)
-    number[padded] = np.arange(len(pixels))
-    rows, columns = pixels.T
-    found = np.stack([number[rows + down, columns + across] for down, across in steps], axis=1)
-    for slot, (down, across) in enumerate(steps[4:], 4):
-        found[padded[rows + down, columns] | padded[rows, columns + across], slot] = -1
-    return pixels - 1, [[n for n in row if n >= 0] for row in found.tolist()]
-
-
-def _graph(thin: Bools, radii: Floats) -> Graph:
-    """Return the graph of a skeleton that is one pixel wide."""
-    pixels, near = _neighbours(thin)
-    degrees = [len(row) for row in near]
-    sets = Sets(len(pixels))
-    for i, row in enumerate(near):
-        for j in row:
-            if degrees[i] > 2 and degrees[j] > 2:
-                sets.join(i, j)
-    names: dict[int, int] = {}
-    node_of = [
-        -1 if degree == 2 else names.setdefault(sets.find(i), len(names)) for i, degree in enumerate(degrees)
-    ]
-    places = pixels[:, ::-1] + 0.5
-    members = [i for i, node in enumerate(node_of) if node >= 0]
-    owners = np.array([node_of[i] for i in members], np.int64)
-    half = radii[pixels[:, 0], pixels[:, 1]]
-    centers, width = _merged(places[members], half[members], owners, len(names))
-    walks, rings = _walks(near, node_of, members)
-    chains = [
-        (np.concatenate([centers[a : a + 1], places[path], centers[b : b + 1]]), (a, b))
-        for path, a, b in walks
-    ]
-    own = [ring[0] for ring in rings]
-    chains += [(places[[*ring, ring[0]]], (len(names) + i,) * 2) for i, ring in enumerate(rings)]
-    lone = sorted(set(range(len(names))) - {node for _, nodes in chains for node in nodes})
-    chains += [(np.repeat(centers[node : node + 1], 2, axis=0), (node, node)) for node in lone]
-    edges = [Edge(points, nodes, float(np.median(at_pixels(radii, points)))) for points, nodes in chains]
-    return Graph(edges, np.concatenate([centers, places[own]]), np.concatenate([width, half[own]]))
-
-
-def _merged(places: Floats, radii: Floats, owners: Ints, count: int) -> tuple[Floats, Floats]:
-    """Return the mean place and the largest radius of each of ``count`` nodes, from its pixels."""
-    sizes = np.maximum(np.bincount(owners, minlength=count), 1)
-    means = np.stack([np.bincount(owners, places[:, axis], count) / sizes for axis in (0, 1)], axis=1)
-    largest = np.zeros(count)
-    np.maximum.at(largest, owners, radii)
-    return means, largest
-
-
-def _walks(
-    near: list[list[int]], node_of: list[int], members: list[int]
-) -> tuple[list[tuple[list[int], int, int]], list[list[int]]]:
-    """Return the paths of pixels from node to node, with these, and the rings without a node.
-
-    ``near``: neighbours of each pixel; ``node_of``: its node or -1; ``members``: the pixels of nodes.
-    """
-    seen = [node >= 0 for node in node_of]
-
-    def walk(before: int, here: int) -> tuple[list[int], int]:
-        """Return the pixels from ``here`` up to a node or to one seen, away from ``before``; and that one."""
-        path = []
-        while not seen[here]:
-            seen[here] = True
-            path.append(here)
-            before, here = here, next(n for n in near[here] if n != before)
-        return path, here
-
-    walks: list[tuple[list[int], int, int]] = []
-    for start in members:
-        for first in near[start]:
-            if node_of[first] < 0 and not seen[first]:
-                path, last = walk(start, first)
-                walks.append((path, node_of[start], node_of[last]))
-            elif node_of[first] >= 0 and node_of[first] != node_of[start] and first > start:
-                walks.append(([], node_of[start], node_of[first]))
-    rings = []
-    for start in range(len(near)):
-        if not seen[start]:
-            seen[start] = True
-            rings.append([start, *walk(start, near[start][0])[0]])
-    return walks, rings
+    number[padded] = np.arange(padded.sum())
+    rows, columns = np.nonzero(padded)
+    pairs = []
+    for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        linked = padded[rows + down, columns + across]
+        if down and across:
+            linked &= ~(padded[rows + down, columns] | padded[rows, columns + across])
+        pairs.append(np.stack([number[rows, columns], number[rows + down, columns + across]], axis=1)[linked])
+    lone = np.setdiff1d(number[padded], np.concatenate(pairs))
+    links = np.concatenate([*pairs, np.stack([lone, lone], axis=1)])
+    places, half = np.stack([columns, rows], axis=1) - 0.5, radii[thin]
+    ends = zip(places[links], half[links], links.tolist(), strict=True)
+    return Graph([Edge(points, widths, (a, b)) for points, widths, (a, b) in ends], places, half)
 
 
 def _without_burrs(graph: Graph) -> Graph:
     """Return the graph without free ends that hardly reach beyond the ink they begin in; lone lines stay."""
     while True:
-        free = [len(edges) == 1 for edges in graph.at]
-
-        def is_burr(edge: Edge, free: list[bool] = free, radii: Floats = graph.radii) -> bool:
-            a, b = edge.nodes
-            if a == b or free[a] == free[b]:
-                return False
-            tip, root = (float(radii[node]) for node in ((a, b) if free[a] else (b, a)))
-            return edge.length() + tip <= SPUR * root + 1
-
-        kept = [edge for edge in graph.edges if not is_burr(edge)]
+        free = [len(ends) == 1 for ends in graph.at]
+        kept = []
+        for edge in graph.edges:
+            tip, root = edge.nodes if free[edge.nodes[0]] else edge.nodes[::-1]
+            reach = edge.length() + graph.radii[tip]
+            # A blunt end's corner is farther from its middle than its side.
+            if not free[tip] or free[root] or reach > math.sqrt(2) * graph.radii[root] + 1:
+                kept.append(edge)
         if len(kept) == len(graph.edges):
             return graph
         held = {node for edge in kept for node in edge.nodes}
         # Where only burrs meet there is a dot: the longest of them is kept.
-        for node, numbers in enumerate(graph.at):
-            if len(numbers) > 1 and node not in held:
-                kept.append(max((graph.edges[n] for n in numbers), key=Edge.length))
-        graph = with_joined_edges(Graph(kept, graph.places, graph.radii))
+        for node, ends in enumerate(graph.at):
+            if len(ends) > 1 and node not in held:
+                kept.append(max((graph.edges[n] for n, _ in ends), key=Edge.length))
+        graph = _joined(Graph(kept, graph.places, graph.radii))
 
 
-def contracted(graph: Graph, overlaps: list[int]) -> Graph:
-    """Return the graph with each of some edges, in which lines overlap, as one node with its ends."""
-    sets = Sets(len(graph.places))
-    for number in overlaps:
+def contracted(graph: Graph, numbers: Iterable[int]) -> Graph:
+    """Return the graph with each of some edges as one node with its ends."""
+    sets, gone = Sets(len(graph.places)), set(numbers)
+    for number in gone:
         sets.join(*graph.edges[number].nodes)
     names = sets.numbers()
-    places, _ = _merged(graph.places, graph.radii, names, int(names.max(initial=-1)) + 1)
+    sizes = np.bincount(names)
+    places = np.stack([np.bincount(names, graph.places[:, axis]) / sizes for axis in (0, 1)], axis=1)
     radii = np.zeros(len(places))
     np.maximum.at(radii, names, graph.radii + hypot(*(graph.places - places[names]).T))
     edges = []
-    for number in sorted(set(range(len(graph.edges))) - set(overlaps)):
-        edge = graph.edges[number]
+    for number, edge in enumerate(graph.edges):
         a, b = (int(names[node]) for node in edge.nodes)
-        points = edge.points
-        if edge.nodes[0] != edge.nodes[1]:
-            if a == b and (hypot(*(points - places[a]).T) <= radii[a]).all():
-                continue
-            points = np.concatenate([places[a : a + 1], points[1:-1], places[b : b + 1]])
-        edges.append(replace(edge, points=points, nodes=(a, b)))
-    return with_joined_edges(Graph(edges, places, radii))
-
-
-def with_joined_edges(graph: Graph) -> Graph:
-    """Make one edge of two that meet at a node where no other does."""
-    at = [list(edges) for edges in graph.at]
-    edges: list[Edge | None] = list(graph.edges)
-    for node, numbers in enumerate(at):
-        if len(numbers) != 2 or numbers[0] == numbers[1]:
+        is_loop = a == b and edge.nodes[0] != edge.nodes[1]
+        if number in gone or (is_loop and (hypot(*(edge.points - places[a]).T) <= radii[a]).all()):
             continue
-        one, other = edges[numbers[0]], edges[numbers[1]]
-        assert one is not None and other is not None
-        one = one if one.nodes[1] == node else one.backwards()
-        other = other if other.nodes[0] == node else other.backwards()
-        longer = max(one, other, key=Edge.length)
-        both = replace(
-            longer,
-            points=np.concatenate([one.points, other.points[1:]]),
-            nodes=(one.nodes[0], other.nodes[1]),
-        )
-        edges[numbers[0]], edges[numbers[1]] = both, None
-        far = at[other.nodes[1]]
-        far[far.index(numbers[1])] = numbers[0]
-        numbers.clear()
-    return Graph([edge for edge in edges if edge is not None], graph.places, graph.radii)
+        points = edge.points.copy()
+        points[0], points[-1] = places[a], places[b]
+        edges.append(Edge(points, edge.radii, (a, b)))
+    bare = {int(names[graph.edges[n].nodes[0]]) for n in gone} - {
+        node for edge in edges for node in edge.nodes
+    }
+    edges += [Edge(places[[node] * 2], radii[[node] * 2], (node, node)) for node in sorted(bare)]
+    return _joined(Graph(edges, places, radii))
+
+
+def _joined(graph: Graph) -> Graph:
+    """Make one edge of two that meet at a node where no other does."""
+    following: dict[End, End] = {}
+    for ends in graph.at:
+        if len(ends) == 2 and ends[0][0] != ends[1][0]:
+            following |= {ends[0]: ends[1], ends[1]: ends[0]}
+    edges = []
+    for run, _ in runs_of(len(graph.edges), following):
+        parts = [graph.edge_from(end) for end in run]
+        points = np.concatenate([parts[0].points[:1], *(part.points[1:] for part in parts)])
+        radii = np.concatenate([parts[0].radii[:1], *(part.radii[1:] for part in parts)])
+        edges.append(Edge(points, radii, (parts[0].nodes[0], parts[-1].nodes[1])))
+    return Graph(edges, graph.places, graph.radii)
+
+
+def runs_of(count: int, following: dict[End, End]) -> list[tuple[list[End], bool]]:
+    """Return the ends from which edges go on into one another, and whether the last goes on as the first.
+
+    Args:
+        count: Of the edges.
+        following: The end at which each end goes on, if it does.
+    """
+    starts = [(n, end) for n in range(count) for end in (0, 1) if (n, end) not in following]
+    seen = [False] * count
+    runs = []
+    for first in (*starts, *((n, 0) for n in range(count))):
+        run: list[End] = []
+        here: End | None = first
+        while here is not None and not seen[here[0]]:
+            seen[here[0]] = True
+            run.append(here)
+            here = following.get((here[0], 1 - here[1]))
+        if run:
+            runs.append((run, here == first))
+    return runs

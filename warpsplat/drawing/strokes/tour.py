@@ -12,40 +12,31 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints
 from warpsplat.portable.elementary import hypot
-from warpsplat.scene import IndexArray, Scene
-from warpsplat.scene.scene import ranges
-
-LOOK_AHEAD = 1500
-"""Strokes of the longest part of a tour that is reversed, and of a tour that is improved more than once."""
+from warpsplat.scene import Scene
 
 
 def toured(scene: Scene) -> Scene:
     """Order the strokes of each layer, of one contour each, to minimise pen-up travel.
 
-    Some are drawn backwards, and rings from another place on.
+    Some are drawn backwards, and rings from where the pen comes by.
     """
-    ends = _ends(scene)
-    order, turned, here = np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(2)
+    first = scene.first[:-1]
+    last = np.where(scene.closed == 1, first, scene.first[1:] - 1)
+    ends = scene.points[np.stack([first, last])].astype(np.float64)
+    order, points, here = [], [], np.zeros(2)
     for layer in np.unique(scene.layer).tolist():
         index = np.flatnonzero(scene.layer == layer)
         places = ends[:, index].reshape(-1, 2)
-        tour = _improved(places, _greedy(places, here))
-        backwards, strokes = np.divmod(tour, len(index))
-        order, turned = np.append(order, index[strokes]), np.append(turned, backwards)
-        here = places[_others(tour, len(index))[-1]]
-    scene = scene.take(order)
-    points: IndexArray = ranges(scene.first[:-1], scene.point_counts())
-    for stroke in np.flatnonzero((turned == 1) & (scene.closed == 0)).tolist():
-        own = slice(*scene.first[stroke : stroke + 2])
-        points[own] = points[own][::-1]
-    return _with_rings_begun_nearby(replace(scene, points=scene.points[points]))
-
-
-def _ends(scene: Scene) -> Floats:
-    """Return where strokes begin and end, shape (2, stroke, 2); rings end where they begin."""
-    first = scene.first[:-1]
-    last = np.where(scene.closed == 1, first, scene.first[1:] - 1)
-    return scene.points[np.stack([first, last])].astype(np.float64)
+        for backwards, stroke in np.stack(np.divmod(_tour(places, here), len(index)), axis=1).tolist():
+            order.append(int(index[stroke]))
+            own = scene.points_of(order[-1])
+            if scene.closed[order[-1]]:
+                own = np.roll(own, -3 * int(hypot(*(own[::3] - here).T).argmin()), axis=0)
+            elif backwards:
+                own = own[::-1]
+            points.append(own)
+            here = own[0 if scene.closed[order[-1]] else -1]
+    return replace(scene.take(np.array(order, np.intp)), points=np.concatenate(points))
 
 
 def _others(ends: Ints, count: int) -> Ints:
@@ -53,13 +44,8 @@ def _others(ends: Ints, count: int) -> Ints:
     return (ends + count) % (2 * count)
 
 
-def _travel(places: Floats, tour: Ints) -> float:
-    """Return the length of a tour between its strokes."""
-    return float(hypot(*(places[tour][1:] - places[_others(tour, len(tour))][:-1]).T).sum())
-
-
-def _greedy(places: Floats, here: Floats) -> Ints:
-    """Return the tour from ``here`` that always goes on to the nearest end."""
+def _tour(places: Floats, here: Floats) -> Ints:
+    """Return the tour from ``here`` that goes on to the nearest end, shortened by reversing parts (2-opt)."""
     count = len(places) // 2
     left, tour = np.arange(2 * count), np.zeros(count, np.intp)
     for step in range(count):
@@ -67,48 +53,23 @@ def _greedy(places: Floats, here: Floats) -> Ints:
         tour[step] = left[(away * away).sum(axis=1).argmin()]
         here = places[_others(tour[step], count)]
         left = left[left % count != tour[step] % count]
+    while _shorten(places, tour):
+        pass
     return tour
 
 
-def _improved(places: Floats, tour: Ints) -> Ints:
-    """Return a tour shortened by reversing parts of it (2-opt)."""
-    while True:
-        before, tour = _travel(places, tour), _with_reversed_parts(places, tour)
-        if len(tour) > LOOK_AHEAD or not _travel(places, tour) < before:
-            return tour
-
-
-def _with_reversed_parts(places: Floats, tour: Ints) -> Ints:
-    """Return a tour with each part of up to LOOK_AHEAD strokes reversed, where that shortens it."""
-    tour, count = tour.copy(), len(tour)
+def _shorten(places: Floats, tour: Ints) -> bool:
+    """Reverse parts of a tour where that shortens it, and return whether it does anywhere."""
+    count, is_shorter = len(tour), False
     for low in range(count):
-        high = np.arange(low, min(low + LOOK_AHEAD, count))
-        now, then = np.zeros(len(high)), np.zeros(len(high))
         entries, exits = places[tour], places[_others(tour, count)]
+        saved = np.zeros(count - low)
         if low:
-            now += hypot(*(entries[low] - exits[low - 1]))
-            then += hypot(*(exits[high] - exits[low - 1]).T)
-        inner = high < count - 1
-        following = np.minimum(high + 1, count - 1)
-        now += inner * hypot(*(entries[following] - exits[high]).T)
-        then += inner * hypot(*(entries[following] - entries[low]).T)
-        best = int((then - now).argmin())
-        if then[best] < now[best]:
-            part = slice(low, int(high[best]) + 1)
-            tour[part] = _others(tour[part][::-1], count)
-    return tour
-
-
-def _with_rings_begun_nearby(scene: Scene) -> Scene:
-    """Return strokes, rings begun where the pen comes by."""
-    starts, ends = _ends(scene)
-    points = scene.points.copy()
-    for shape in np.flatnonzero(scene.closed == 1).tolist():
-        own = scene.points_of(shape)
-        near = [ends[shape - 1]] if shape else []
-        near += [starts[shape + 1]] if shape + 1 < len(scene) else []
-        away = np.sum([hypot(*(own[::3] - place).T) for place in near], axis=0)
-        begin = 3 * int(np.argmin(away)) if near else 0
-        points[scene.first[shape] : scene.first[shape + 1]] = np.roll(own, -begin, axis=0)
-        starts[shape] = ends[shape] = own[begin]
-    return replace(scene, points=points)
+            saved += hypot(*(entries[low] - exits[low - 1])) - hypot(*(exits[low:] - exits[low - 1]).T)
+        after = entries[low + 1 :]
+        saved[:-1] += hypot(*(after - exits[low:-1]).T) - hypot(*(after - entries[low]).T)
+        best = int(saved.argmax())
+        if saved[best] > 1e-9:
+            tour[low : low + best + 1] = _others(tour[low : low + best + 1][::-1], count)
+            is_shorter = True
+    return is_shorter
