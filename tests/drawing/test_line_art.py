@@ -104,8 +104,8 @@ def test_mixed_line_art_keeps_its_areas(device: str) -> None:
     result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
     assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
     assert np.bincount(result.scene.kind).tolist() == [1, 2]
-    assert result.scene.point_counts()[0] == 12  # a circle, although a line begins at it
-    assert scored(result).psnr > 34
+    # A circle, although a line begins at it, or with the beginning of the line as exact as it is drawn.
+    assert scored(result).psnr > (34 if result.scene.point_counts()[0] == 12 else 42)
 
 
 def test_without_areas_all_is_strokes_a_disc_a_dot_and_the_rest_rings(device: str) -> None:

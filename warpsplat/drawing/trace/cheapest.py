@@ -8,16 +8,14 @@ import numpy as np
 
 from warpsplat.drawing.trace.cubics import fit_handles
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints
-from warpsplat.drawing.trace.spans import Spans
+from warpsplat.drawing.trace.spans import Spans, between
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured
-LINE_COST, CUBIC_COST = 1.0, 1.4  # what a piece counts, about its bytes
+CUBIC_COST = 1.4  # what a cubic counts over a line, about its bytes
 ERROR_COST = 0.35  # what an error of the size of the tolerance counts for each piece
-FORCED_COST = 2 * CUBIC_COST  # of a cubic between two knots that are neighbours, whatever its error
 MOST_KNOTS = 48  # between which all curves are tried
-PAIRS = 1 << 17  # of knots that are looked at together, about, which bounds the memory
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
 
 
@@ -49,64 +47,42 @@ class CurvePieces:
         )
 
 
-def cheapest_chains(spans: Spans, tolerances: Floats) -> CurvePieces:
+def cheapest_chains(spans: Spans, tolerances: Floats, most: int = 1) -> CurvePieces:
     """Return the pieces of the cheapest chain of each span, in order.
 
     Of a long span a few knots are tried first; where no curve from one to the next is near enough, those
-    between them, too.
+    between them, too. Many spans need no other than their ends.
 
     Args:
         spans: Not empty.
         tolerances: Largest distance of a point of each from its curve [px], shape (span,).
+        most: Pieces that a span is divided into at first, at the most.
     """
-    index, first = _few(spans.first)
-    chains = _chains(spans.at(index, first), tolerances)
-    owner = np.searchsorted(first, chains.begin, "right") - 1
-    chains = replace(chains, span=owner, begin=index[chains.begin], end=index[chains.end])
+    steps = np.diff(spans.first) - 1
+    counts = np.minimum(steps, most) + 1
+    owner, number = np.repeat(np.arange(len(steps)), counts), ranges(np.zeros_like(counts), counts)
+    first = starts_of(counts)
+    index = spans.first[owner] + number * steps[owner] // (counts[owner] - 1)
+    chains = _cheapest(spans.at(index, first), tolerances)
+    chains = replace(chains, begin=index[chains.begin], end=index[chains.end])
     far = ~np.isfinite(chains.costs) & (chains.end > chains.begin + 1)
     if far.any():
-        begin, counts = chains.begin[far], (chains.end - chains.begin)[far] + 1
+        begin, counts, span = chains.begin[far], (chains.end - chains.begin)[far] + 1, chains.span[far]
         inner = ranges(begin, counts)
-        parts = cheapest_chains(spans.at(inner, starts_of(counts)), tolerances[owner[far]])
-        parts = replace(parts, span=owner[far][parts.span], begin=inner[parts.begin], end=inner[parts.end])
+        parts = cheapest_chains(spans.at(inner, starts_of(counts)), tolerances[span], MOST_KNOTS)
+        parts = replace(parts, span=span[parts.span], begin=inner[parts.begin], end=inner[parts.end])
         chains = CurvePieces.joined([chains.take(~far), parts])
-    return chains.take(np.lexsort((chains.begin, chains.span)))
-
-
-def _few(first: Ints) -> tuple[Ints, Ints]:
-    """Return at most ``MOST_KNOTS`` knots of each span, evenly chosen, and the first of each span."""
-    steps = np.diff(first) - 1
-    counts = np.minimum(steps, MOST_KNOTS) + 1
-    owner, number = np.repeat(np.arange(len(steps)), counts), ranges(np.zeros_like(counts), counts)
-    return first[owner] + number * steps[owner] // (counts[owner] - 1), starts_of(counts)
-
-
-def _chains(spans: Spans, tolerances: Floats) -> CurvePieces:
-    """Return cheapest chains as ``cheapest_chains``, of spans with few knots.
-
-    A chain of one piece, if there is one, is cheaper than any other: many spans need no other candidates.
-    """
-    first, last = spans.first[:-1], spans.first[1:] - 1
-    number = np.arange(len(first))
-    whole = _candidates(spans, number, first, last, tolerances)
-    is_enough = np.isfinite(whole.costs) | (last == first + 1)
-    rest = number[~is_enough]
-    found = [whole.take(is_enough)]
-    pairs = np.cumsum((last - first)[rest] ** 2)
-    for group in np.split(rest, np.flatnonzero(np.diff(pairs // PAIRS)) + 1):
-        found.append(_cheapest(spans, group, tolerances))
-    chains = CurvePieces.joined(found)
     return chains.take(np.argsort(chains.begin, kind="stable"))
 
 
-def _cheapest(spans: Spans, group: Ints, tolerances: Floats) -> CurvePieces:
-    """Return the cheapest chains of some spans, by dynamic programming over pairs of knots."""
-    first, last = spans.first[group], spans.first[group + 1] - 1
+def _cheapest(spans: Spans, tolerances: Floats) -> CurvePieces:
+    """Return the cheapest chains of spans with few knots, by dynamic programming over pairs of knots."""
+    first, last = spans.first[:-1], spans.first[1:] - 1
     number, level, end = _pairs(last - first + 1)
     begin, end = first[number] + level, first[number] + end
-    pieces = _candidates(spans, group[number], begin, end, tolerances)
-    # A curve may go to the next knot, whatever its error.
-    costs = np.where((end == begin + 1) & ~np.isfinite(pieces.costs), FORCED_COST, pieces.costs)
+    pieces = _candidates(spans, number, begin, end, tolerances)
+    # A curve may go to the next knot, whatever its error, if no chain can do without.
+    costs = np.where((end == begin + 1) & ~np.isfinite(pieces.costs), MOST_KNOTS, pieces.costs)
     best, back = np.full(len(spans.knots), np.inf), np.zeros(len(spans.knots), np.intp)
     best[first] = 0
     order = np.argsort(level, kind="stable")
@@ -137,19 +113,14 @@ def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Fl
 
 def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) -> CurvePieces:
     """Return candidates as ``_candidates``, not so many."""
-    low, high = spans.places[begin], spans.places[end]
-    where = low + (high - low) * np.linspace(0, 1, SAMPLES)[:, None]
-    left = np.minimum(where.astype(np.intp), high - 1)
-    share = where - left
+    low, steps = spans.places[begin], spans.places[end] - spans.places[begin]
     start, goal = spans.knots[begin], spans.knots[end]
-    x, y = (
-        own[left] * (1 - share) + own[left + 1] * share - origin
-        for own, origin in zip(spans.points.T, start.T, strict=True)
-    )
+    where = steps * np.linspace(0, 1, SAMPLES)[:, None]
+    x, y = np.moveaxis(between(spans.points, low, where, steps) - start, 2, 0)
     # Towards a knot its own place counts, not the noisy point there.
     x[0], y[0], (x[-1], y[-1]) = 0, 0, (goal - start).T
     tolerance = tolerances[span]
-    costs = _costs(_line_errors(x, y), LINE_COST, tolerance)
+    costs = _costs(_line_errors(x, y), 1, tolerance)
     is_line = np.isfinite(costs)
     cubics = np.stack([start, start, goal, goal], axis=1)
     # No cubic is cheaper than a line that is near enough.

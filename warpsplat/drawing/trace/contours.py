@@ -41,20 +41,13 @@ def assembled(parts: Sequence[Pieces | Floats]) -> Pieces | None:
     return Pieces(np.concatenate(cubics), np.concatenate(lines))
 
 
-def _around(contours: list[Pieces]) -> tuple[Floats, Bools, Ints, Ints]:
-    """Return cubics of contours, which are lines, the cubic before each, and the first of each contour."""
-    counts = np.array([len(contour.cubics) for contour in contours], np.int64)
-    first = starts_of(counts)
-    before = np.arange(first[-1]) - 1
-    before[first[:-1]] = first[1:] - 1
-    cubics = np.concatenate([*(contour.cubics for contour in contours), np.zeros((0, 4, 2))])
-    lines = np.concatenate([*(contour.lines for contour in contours), np.zeros(0, np.bool_)])
-    return cubics, lines, before, first
-
-
 def joints_of(contours: list[Pieces]) -> Ints:
     """Return the joint of each point of contours, three for each piece."""
-    cubics, lines, before, _ = _around(contours)
+    cubics = np.concatenate([*(contour.cubics for contour in contours), np.zeros((0, 4, 2))])
+    lines = np.concatenate([*(contour.lines for contour in contours), np.zeros(0, np.bool_)])
+    first = starts_of(np.array([len(contour.cubics) for contour in contours], np.int64))
+    before = np.arange(len(cubics)) - 1
+    before[first[:-1]] = first[1:] - 1
     line_before = lines[before]
     arriving, leaving = (cubics[:, 3] - cubics[:, 2])[before], cubics[:, 1] - cubics[:, 0]
     cross = np.abs(arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0])

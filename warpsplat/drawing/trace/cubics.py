@@ -14,7 +14,6 @@ from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 
 ROUNDS = 3  # of fitting handles and finding the parameters of the points
-LEAST_HANDLE, MOST_HANDLE = 0.02, 3.0  # over the chord
 
 SAMPLES = 12  # on each of two cubics that become one
 
@@ -83,9 +82,7 @@ def _handles(ahead: Floats, back: Floats, x: Floats, y: Floats, t: Floats) -> Fl
     is_safe = np.abs(det) > 1e-9
     handles = np.stack([a22 * y1 - a12 * y2, a11 * y2 - a12 * y1]) / np.where(is_safe, det, 1)
     chord = hypot(x[-1], y[-1])
-    is_good = (
-        is_safe & (handles >= LEAST_HANDLE * chord).all(axis=0) & (handles <= MOST_HANDLE * chord).all(axis=0)
-    )
+    is_good = is_safe & (handles > 0).all(axis=0)
     return np.where(is_good, handles, chord / 3)
 
 

@@ -1,4 +1,4 @@
-"""Which region lies under which: a tree of what is inside what, and votes among neighbours."""
+"""Which region lies under which: a tree of what is inside what, and larger ones below smaller ones."""
 
 from __future__ import annotations
 
@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
-from warpsplat.drawing.trace.planar import STEPS, Loops
-from warpsplat.portable.elementary import hypot
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Ints
+from warpsplat.drawing.trace.planar import Loops
 
 LINE_WIDTH = 7.0  # [px] of the widest region that is a line
-LOOK = 6  # cracks over which the direction of an outline is taken at a T-junction
-STRAIGHT = 0.85  # cosine from which on an outline goes straight on there
-MOST_SORTED = 400  # siblings that are put in order by votes; more are by size
 
 
 @dataclass(frozen=True)
@@ -103,7 +99,10 @@ def in_holes_with(loops: Loops, marked: Bools) -> Bools:
 
 
 def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
-    """Put the regions in the order of painting.
+    """Put the regions in the order of painting: what lies in a region after it, the larger ones first.
+
+    Lines lie at the back: what they separate is drawn over them, and where it does not quite meet, the line
+    shows.
 
     Args:
         loops: Of all regions.
@@ -114,7 +113,6 @@ def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
     Returns:
         The rank of each region: higher is painted later; -1 for those that are not painted. Shape (region,).
     """
-    votes = _votes(loops, unpainted)
     cracks = np.bincount(
         np.maximum(loops.region, 0), np.where(loops.region >= 0, np.diff(loops.first), 0), len(sizes)
     )
@@ -127,57 +125,5 @@ def find_ranks(loops: Loops, tree: Tree, sizes: Ints, unpainted: Bools) -> Ints:
             rank[region] = count
             count += 1
         for siblings in tree.children.get(region, []):
-            waiting.extend(reversed(_sorted(siblings, votes, sizes, is_line)))
+            waiting.extend(sorted(siblings, key=lambda one: (is_line[one], sizes[one])))
     return rank
-
-
-def _votes(loops: Loops, unpainted: Bools) -> dict[int, dict[int, int]]:
-    """Count at how many T-junctions a region a seems to lie above a region b: ``votes[a][b]``.
-
-    Of the three regions that meet, the one whose outline goes straight on lies above the other two.
-    """
-    votes: dict[int, dict[int, int]] = {}
-    for loop in range(len(loops)):
-        region = int(loops.region[loop])
-        if region == NO_REGION or unpainted[region]:
-            continue
-        low, high = int(loops.first[loop]), int(loops.first[loop + 1])
-        others, size = loops.others[low:high], high - low
-        changes = np.flatnonzero(others != np.roll(others, 1))
-        if not len(changes):
-            continue
-        steps = STEPS[loops.directions[low:high]]
-        window = np.arange(max(1, min(LOOK, size // 4)))[:, None]
-        ahead = steps[(changes + window) % size].sum(axis=0)
-        behind = steps[(changes - 1 - window) % size].sum(axis=0)
-        lengths = hypot(*ahead.T) * hypot(*behind.T)
-        cosines = (ahead * behind).sum(axis=1) / np.maximum(lengths, 1e-6)
-        below = votes.setdefault(region, {})
-        for change in changes[cosines >= STRAIGHT].tolist():
-            for other in (int(others[change]), int(others[change - 1])):
-                below[other] = below.get(other, 0) + 1
-    return votes
-
-
-def _sorted(siblings: list[int], votes: dict[int, dict[int, int]], sizes: Ints, is_line: Bools) -> list[int]:
-    """Return siblings from the back to the front.
-
-    Lines lie at the back: what they separate is drawn over them, and where it does not quite meet, the line
-    shows.
-    """
-    by_size = sorted(siblings, key=lambda region: (not is_line[region], -int(sizes[region])))
-    if len(by_size) > MOST_SORTED or len(by_size) < 2:
-        return by_size
-    index = {region: i for i, region in enumerate(by_size)}
-    above: Floats = np.zeros((len(by_size), len(by_size)))
-    for region in by_size:
-        for other, count in votes.get(region, {}).items():
-            if other in index and not is_line[region]:
-                above[index[region], index[other]] += count
-    above_minus_below = np.maximum(above - above.T, 0)
-    left, result = list(range(len(by_size))), []
-    while left:
-        # Next comes the region with the fewest remaining regions below it.
-        sums = above_minus_below[np.ix_(left, left)].sum(axis=1)
-        result.append(by_size[left.pop(int(np.argmin(sums)))])
-    return result

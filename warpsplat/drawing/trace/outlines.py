@@ -10,7 +10,7 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats
 from warpsplat.drawing.trace.partition import Partition
 from warpsplat.drawing.trace.planar import INSIDE, LEFT, OUTSIDE, RIGHT, STEPS, Loops
 
-TREND = 3  # cracks ahead and behind that tell the direction of an outline
+TREND = 4  # cracks ahead and behind that tell the direction of an outline
 
 
 @dataclass(frozen=True)
@@ -53,20 +53,15 @@ def _offsets(loops: Loops, partition: Partition) -> Floats:
 
 
 def _trends(loops: Loops) -> Floats:
-    """Return the direction of the outline at each crack, from those near it; shape (crack, 2)."""
-    return _around(loops, STEPS[loops.directions].astype(np.float64), TREND)
+    """Return the direction of the outline at each crack, the sum of those up to ``TREND`` ahead and behind.
 
-
-def _around(loops: Loops, values: Floats, reach: int) -> Floats:
-    """Return the sums of ``values`` at the cracks, over those up to ``reach`` ahead and behind.
-
-    The outermost count half: on a diagonal, horizontal and vertical ones are then as many.
+    The outermost count half: on a diagonal, horizontal and vertical ones are then as many. Shape (crack, 2).
     """
-    sizes = np.diff(loops.first)
+    steps, sizes = STEPS[loops.directions].astype(np.float64), np.diff(loops.first)
     size, base = np.repeat(sizes, sizes), np.repeat(loops.first[:-1], sizes)
-    position = np.arange(len(values)) - base
-    total = values.copy()
-    for away in range(1, reach + 1):
-        share = 0.5 if away == reach else 1.0
-        total += share * (values[base + (position + away) % size] + values[base + (position - away) % size])
-    return np.asarray(total)
+    position = np.arange(len(steps)) - base
+    total = steps.copy()
+    for away in range(1, TREND + 1):
+        share = 0.5 if away == TREND else 1.0
+        total += share * (steps[base + (position + away) % size] + steps[base + (position - away) % size])
+    return total

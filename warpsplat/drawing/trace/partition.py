@@ -21,11 +21,11 @@ from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.shares import Shares, beside_borders, colors_at, find_shares
 from warpsplat.scene.scene import numbers_in
 
-SCALES = 4, 3, 2
-"""Cells of a grid finer than the pixels along one, the finest first."""
+FINEST = 4
+"""Cells of the finest grid along a pixel."""
 
 MOST_CELLS = 1 << 20
-"""Cells of such a grid, which bounds time and memory."""
+"""Cells of a grid finer than the pixels, which bounds time and memory."""
 
 MOST_DOUBT = 0.1
 """How far off boundaries may be on such a grid [cell]: what is finer shows noise."""
@@ -67,7 +67,8 @@ def find_partition(regions: Regions) -> Partition:
     at_border = beside_borders(shares.first) | (shares.share < 1)
     doubt = _usual(shares, at_border)
     pixels = regions.labels.size
-    scale = next((s for s in SCALES if s * s * pixels <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
+    finer = range(FINEST, 1, -1)
+    scale = next((s for s in finer if s * s * pixels <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
     # A border between pixels that are surely of one colouring each is exactly there.
     is_open = at_border & ((shares.share < 1) | (shares.doubt > 0))
     rows, columns = np.nonzero(dilated(is_open, 3))

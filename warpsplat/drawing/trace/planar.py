@@ -22,13 +22,13 @@ from warpsplat.drawing.trace.grids import (
 
 RIGHT, DOWN, LEFT, UP = range(4)
 
-INSIDE = np.array([(0, 0), (-1, 0), (-1, -1), (0, -1)])
+INSIDE = -np.array([(way in (DOWN, LEFT), way in (LEFT, UP)) for way in (RIGHT, DOWN, LEFT, UP)], np.intp)
 """x and y of the pixel on the right of a crack by its direction, from the vertex where it begins."""
 
-OUTSIDE = np.roll(INSIDE, 1, axis=0)
+OUTSIDE = INSIDE[[UP, RIGHT, DOWN, LEFT]]
 """The same on its left."""
 
-STEPS = INSIDE - np.roll(INSIDE, -1, axis=0)
+STEPS = INSIDE - INSIDE[[DOWN, LEFT, UP, RIGHT]]
 """x and y of a crack by its direction."""
 
 
@@ -66,59 +66,31 @@ def find_loops(labels: Ints, image: Floats, chosen: Bools | None = None) -> Loop
         image: What the labels are of; it decides which of two regions is connected where they cross.
         chosen: The regions, shape (region,). None: all, and the outside of the image.
     """
-    padded = np.pad(labels, 1, constant_values=NO_REGION)
     height, width = labels.shape
-    main, other = _passages(labels, image)
-    wanted = None if chosen is None else np.append(chosen, False)[padded]  # NO_REGION is the last
+    padded = np.pad(labels, 1, constant_values=NO_REGION)
+    corners = [padded[1 + y :, 1 + x :][: height + 1, : width + 1] for x, y in INSIDE.tolist()]
+    # Two diagonal pixels of one label are connected in a vertex, unless the other two are.
+    rows, columns = np.nonzero(crossings(labels))
+    prefers_main = prefers_main_diagonal(image, rows, columns)
+    parted = np.zeros((2, height + 1, width + 1), np.bool_)  # on the main diagonal, and on the other one
+    parted[prefers_main.astype(np.intp), rows + 1, columns + 1] = True
+    wanted = None if chosen is None else np.append(chosen, False)  # NO_REGION is the last
     keys, following, regions, others = [], [], [], []
-    for direction in range(4):
-        (in_x, in_y), (out_x, out_y) = INSIDE[direction], OUTSIDE[direction]
-        step_x, step_y = STEPS[direction]
-        is_level = direction in (RIGHT, LEFT)
-        # Cracks begin at all vertices but those of one border.
-        first = int(direction in (LEFT, UP))
-        top, left = (0, first) if is_level else (first, 0)
-        rows, columns = (height + 1, width) if is_level else (height, width + 1)
-        within = padded[top : top + rows + 1, left : left + columns + 1]
-        mine = within[in_y + 1 :, in_x + 1 :][:rows, :columns]
-        theirs = within[out_y + 1 :, out_x + 1 :][:rows, :columns]
-        differ = mine != theirs
-        if wanted is not None:
-            differ &= wanted[top + in_y + 1 :, left + in_x + 1 :][:rows, :columns]
-        ys, xs = np.nonzero(differ)
-        mine, theirs = mine[ys, xs], theirs[ys, xs]
-        ys, xs = ys + top, xs + left
-        end_y, end_x = ys + step_y, xs + step_x
-        ahead = padded[end_y + in_y + 1, end_x + in_x + 1]
-        ahead_left = padded[end_y + out_y + 1, end_x + out_x + 1]
+    for direction in (RIGHT, DOWN, LEFT, UP):
+        inside, outside = corners[direction], corners[direction - 1]
+        differ = inside != outside
+        ys, xs = np.nonzero(differ if wanted is None else differ & wanted[inside])
+        mine, theirs = inside[ys, xs], outside[ys, xs]
+        end_x, end_y = xs + STEPS[direction, 0], ys + STEPS[direction, 1]
+        goes_on, crosses = inside[end_y, end_x] == mine, outside[end_y, end_x] == mine
         # At the end of a level crack, ours and the pixel across are on the other diagonal.
-        passes = (other if is_level else main)[end_y, end_x]
-        turn = np.where(ahead != mine, 1, np.where(ahead_left != mine, 0, 3))
-        turn = np.where((ahead != mine) & (ahead_left == mine) & passes, 3, turn)
+        crosses &= goes_on | ~parted[int(direction in (RIGHT, LEFT)), end_y, end_x]
+        turn = np.where(crosses, UP, np.where(goes_on, RIGHT, DOWN))
         keys.append((ys * (width + 1) + xs) * 4 + direction)
         following.append((end_y * (width + 1) + end_x) * 4 + (direction + turn) % 4)
         regions.append(mine)
         others.append(theirs)
     return _assembled(width, *(np.concatenate(part) for part in (keys, following, regions, others)))
-
-
-def _passages(labels: Ints, image: Floats) -> tuple[Bools, Bools]:
-    """Find the vertices where two diagonal pixels are connected though they share a point only.
-
-    Returns:
-        For the main diagonal, and for the other one, shape (height + 1, width + 1).
-    """
-    height, width = labels.shape
-    main = np.zeros((height + 1, width + 1), np.bool_)
-    other = np.zeros_like(main)
-    a, b, c, d = labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]
-    main[1:-1, 1:-1] = (a == d) & (b != a) & (c != a)
-    other[1:-1, 1:-1] = (b == c) & (a != b) & (d != b)
-    rows, columns = np.nonzero(crossings(labels))
-    preferred = prefers_main_diagonal(image, rows, columns)
-    main[rows + 1, columns + 1] = preferred
-    other[rows + 1, columns + 1] = ~preferred
-    return main, other
 
 
 def _assembled(width: int, keys: Ints, following: Ints, regions: Ints, others: Ints) -> Loops:

@@ -13,20 +13,18 @@ from functools import cached_property
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
-from warpsplat.drawing.trace.hidden import Cover, HiddenPaths
+from warpsplat.drawing.trace.hidden import Cover, hidden_path
 from warpsplat.drawing.trace.outlines import Boundary
 from warpsplat.drawing.trace.planar import STEPS, Loops
 from warpsplat.drawing.trace.spans import Polyline
 from warpsplat.portable.elementary import hypot
-from warpsplat.portable.linear import eigh
 from warpsplat.scene.scene import ranges, starts_of
 
 SEEN, EDGE, HIDDEN = range(3)
 """The side across a crack: a lower region, the outside of the image, a higher region."""
 
-STILL = 0.02  # [px] offset below which a boundary lies where the pixels meet
 UNDER = 1.0  # [px] how far an outline goes on under the region above it before it turns
-TAIL = 5  # points at the end of a stretch that tell its direction there
+TAIL = 3  # points at the end of a stretch that tell its direction there
 Outline = list[Polyline | Floats]
 """A contour before its curves are fitted: runs, and corners (point, 2) between one run and the next."""
 
@@ -74,29 +72,20 @@ class Stretches:
         """The stretch that each crack is in, shape (crack,)."""
         return np.repeat(np.arange(len(self.loop)), np.diff(self.first))
 
-    def changes(self, values: Ints) -> Bools:
-        """Return where the value of a crack differs from that before, around whole loops; shape (crack,)."""
-        before = np.arange(len(values)) - 1
-        before[self.first[:-1]] = np.where(self.whole, self.first[1:], self.first[:-1] + 1) - 1
-        return np.asarray(values != values[before])
-
     @cached_property
     def turns(self) -> Bools:
-        """Whether a crack has another direction than that before it, shape (crack,)."""
-        return self.changes(self.layers.loops.directions[self.cracks])
-
-    @cached_property
-    def is_still(self) -> Bools:
-        """Whether a stretch lies where the pixels meet, shape (stretch,)."""
-        off = np.abs(self.layers.boundary.offsets[self.cracks])
-        return np.asarray(np.maximum.reduceat(off, self.first[:-1]) <= STILL)
+        """Whether a crack has another direction than that before it, around whole loops; shape (crack,)."""
+        directions = self.layers.loops.directions[self.cracks]
+        before = np.arange(len(directions)) - 1
+        before[self.first[:-1]] = np.where(self.whole, self.first[1:], self.first[:-1] + 1) - 1
+        return np.asarray(directions != directions[before])
 
     @cached_property
     def is_exact(self) -> Bools:
-        """Whether it does, and has few corners, shape (stretch,)."""
-        begin = self.first[:-1]
+        """Whether a stretch lies where the pixels meet, and has few corners, shape (stretch,)."""
+        begin, off = self.first[:-1], np.abs(self.layers.boundary.offsets[self.cracks])
         turns = np.add.reduceat(self.turns.astype(np.intp), begin) - self.turns[begin]
-        return self.is_still & (turns <= 4 + np.diff(self.first) / 40)
+        return (np.maximum.reduceat(off, begin) == 0) & (turns <= 4 + np.diff(self.first) / 40)
 
     @cached_property
     def middles(self) -> Floats:
@@ -147,20 +136,17 @@ def find_stretches(layers: Layers) -> Stretches:
     chosen = np.flatnonzero((loops.region >= 0) & (layers.ranks[loops.region] >= 0))
     counts = np.diff(loops.first)[chosen]
     cracks, owner = ranges(loops.first[chosen], counts), np.repeat(np.arange(len(chosen)), counts)
-    others = loops.others[cracks]
-    above = layers.hiding[np.maximum(others, 0)] > layers.ranks[loops.region[chosen]][owner]
-    kinds = np.where(others == NO_REGION, EDGE, np.where(above, HIDDEN, SEEN))
-    hidden = np.bincount(owner, kinds != HIDDEN, len(chosen)) == 0
+    others, ranks = loops.others[cracks], layers.ranks[loops.region[chosen]][owner]
+    kinds = np.where(layers.hiding[others] > ranks, HIDDEN, SEEN)
+    kinds[others == NO_REGION] = EDGE
+    unseen = np.bincount(owner, kinds != HIDDEN, len(chosen)) == 0
     holed = np.bincount(owner, layers.holed[others], len(chosen)) > 0
     # What has no boundary that is seen is drawn all the same, if it is no hole. A hole of it is left open, a
     # little smaller than what lies over it, where that is transparent inside.
-    kinds[(hidden & ~loops.is_hole[chosen])[owner]] = SEEN
-    kept = ~(hidden & loops.is_hole[chosen] & ~holed)
-    cracks, kinds, owner = (
-        cracks[kept[owner]],
-        kinds[kept[owner]],
-        np.repeat(np.arange(kept.sum()), counts[kept]),
-    )
+    kinds[(unseen & ~loops.is_hole[chosen])[owner]] = SEEN
+    kept = ~(unseen & loops.is_hole[chosen] & ~holed)
+    some = kept[owner]
+    cracks, kinds, owner = cracks[some], kinds[some], np.repeat(np.arange(kept.sum()), counts[kept])
     loop, counts = chosen[kept], counts[kept]
     first, number = starts_of(counts)[:-1], ranges(np.zeros_like(counts), counts)
     before = first[owner] + (number - 1) % counts[owner]
@@ -202,21 +188,19 @@ def find_outlines(layers: Layers) -> list[tuple[int, Outline]]:
 
 def _ring(stretches: Stretches, number: int) -> Polyline | Floats:
     """Return a loop that is all of one kind."""
-    points, first = stretches.points
-    kind = stretches.kind[number]
-    if kind == EDGE or (kind == SEEN and stretches.is_exact[number]):
+    if stretches.is_exact[number] and stretches.kind[number] != HIDDEN:
         return stretches.vertices[number]
+    points, first = stretches.points
     return Polyline(points[first[number] : first[number + 1]], closed=True)
 
 
 def _part(stretches: Stretches, number: int, start: Floats, end: Floats) -> Polyline | Floats:
     """Return a part of a loop that is seen or at the edge of the image."""
-    corners = np.concatenate([start[None], stretches.vertices[number], end[None]])
-    if stretches.kind[number] == EDGE:  # the image's corners, and where a hidden stretch ends or begins
-        before, after = (stretches.kind[beside[number]] == HIDDEN for beside in stretches.neighbours)
-        return corners[0 if before else 1 : None if after else -1]
     if stretches.is_exact[number]:
-        return Polyline(corners, False, is_polygon=True)
+        corners = np.concatenate([start[None], stretches.vertices[number], end[None]])
+        # Beside the edge, what is seen ends there.
+        before, after = (stretches.kind[[number, beside[number]]] for beside in stretches.neighbours)
+        return corners[int((before == (EDGE, SEEN)).all()) : -1 if (after == (EDGE, SEEN)).all() else None]
     points, first = stretches.points
     return Polyline(points[first[number] : first[number + 1]], False, start, end)
 
@@ -228,58 +212,32 @@ def _ends(stretches: Stretches) -> tuple[Floats, Floats]:
     starts = loops.vertices[head].astype(np.float64)
     ends = (loops.vertices[last] + STEPS[loops.directions[last]]).astype(np.float64)
     seen = np.flatnonzero((stretches.kind == SEEN) & ~stretches.whole)
-    _, first = stretches.points
-    before, after = (stretches.kind[beside[seen]] for beside in stretches.neighbours)
-    number = np.arange(TAIL)
-    inside = number < np.diff(first)[seen, None]
-    tails = first[seen, None] + number, first[seen + 1, None] - 1 - number
-    starts[seen] = _extended(stretches, seen, np.where(inside, tails[0], -1), starts[seen], before)
-    ends[seen] = _extended(stretches, seen, np.where(inside, tails[1], -1), ends[seen], after)
+    points, first = stretches.points
+    begin, end = first[seen], first[seen + 1] - 1
+    ranks, inwards = stretches.rank[seen], np.minimum(end - begin, TAIL - 1)
+    cover = stretches.layers.cover
+    starts[seen] = _extended(cover, ranks, points[begin + inwards], points[begin], starts[seen])
+    ends[seen] = _extended(cover, ranks, points[end - inwards], points[end], ends[seen])
     return starts, ends
 
 
-def _extended(stretches: Stretches, seen: Ints, tails: Ints, vertices: Floats, kinds: Ints) -> Floats:
-    """Return where seen stretches end: beside the last vertex, or under what lies above.
+def _extended(cover: Cover, ranks: Ints, inner: Floats, tips: Floats, vertices: Floats) -> Floats:
+    """Return where stretches end that go from ``inner`` points to their last ones: under what lies above.
 
-    Args:
-        stretches: Of all.
-        seen: Numbers of those that are seen, shape (n,).
-        tails: Numbers of the last points, from the end inwards, -1 for no point; shape (n, TAIL).
-        vertices: Where the last crack ends, shape (n, 2).
-        kinds: Of the stretch that comes next, shape (n,).
+    Where nothing does, they end beside the ``vertices`` where their last cracks end.
     """
-    inside, points = (tails >= 0)[..., None], stretches.points[0][tails]
-    count = inside.sum(axis=1)
-    middle = np.where(inside, points, 0).sum(axis=1) / np.maximum(count, 1)
-    x, y = np.moveaxis(np.where(inside, points - middle[:, None], 0), 2, 0)
-    mixed = (x * y).sum(axis=1)
-    shape = np.stack([(x * x).sum(axis=1), mixed, mixed, (y * y).sum(axis=1)], axis=1)
-    direction = eigh(shape.reshape(-1, 2, 2))[1][..., 1]
-    way = points[:, 0] - points[np.arange(len(seen)), np.maximum(count[:, 0] - 1, 0)]
-    direction = np.where((direction * way).sum(axis=1, keepdims=True) > 0, direction, -direction)
-    ahead, behind = (((place - middle) * direction).sum(axis=1) for place in (vertices, points[:, 0]))
-    reached = middle + direction * np.maximum(ahead, behind + 0.1)[:, None]
-    reached = np.where((hypot(*(reached - vertices).T) > 1.0)[:, None], vertices, reached)
-    further = reached + UNDER * direction
-    hidden = stretches.layers.cover.hides(stretches.rank[seen], further)
-    reached = np.where(hidden[:, None], further, reached)
-    size = np.array(stretches.layers.cover.ranks.shape[::-1])
-    at_edge = _at_edge(middle, direction, vertices, size)
-    reached = np.where((kinds == EDGE)[:, None], at_edge, reached)
-    return np.where(count < 2, vertices, reached)
-
-
-def _at_edge(middle: Floats, direction: Floats, vertices: Floats, size: Ints) -> Floats:
-    """Return where lines meet the edge of the image, or ``vertices`` if that is far away."""
-    number = np.arange(len(vertices))
-    axis = np.where((vertices[:, 0] == 0) | (vertices[:, 0] == size[0]), 0, 1)
-    slope, edge = direction[number, axis], vertices[number, axis]
-    is_steep = np.abs(slope) >= 0.3
-    reached = middle + direction * ((edge - middle[number, axis]) / np.where(is_steep, slope, 1))[:, None]
-    reached = np.clip(reached, 0, size)
-    reached[number, axis] = edge
-    is_near = is_steep & (hypot(*(reached - vertices).T) < 1.5)
-    return np.where(is_near[:, None], reached, vertices)
+    way = tips - inner
+    length = hypot(*way.T)[:, None]
+    direction = way / np.maximum(length, 1e-9)
+    ahead = ((vertices - tips) * direction).sum(axis=1, keepdims=True)
+    reached = tips + np.maximum(ahead, 0.1) * direction
+    reached = np.where(hypot(*(reached - vertices).T)[:, None] > 1, vertices, reached)
+    hidden = cover.hides(ranks, reached + UNDER * direction)[:, None]
+    # At the edge of the image all ends on it.
+    size = np.array(cover.ranks.shape[::-1])
+    room = np.where(direction > 0, size - reached, reached) / np.maximum(np.abs(direction), 1e-9)
+    reached = reached + np.clip(room.min(axis=1, keepdims=True), -1, UNDER * hidden) * direction
+    return np.where((length > 0) & (vertices > 0) & (vertices < size), reached, vertices)
 
 
 def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[int, Floats]:
@@ -300,5 +258,8 @@ def _hidden_paths(stretches: Stretches, starts: Floats, ends: Floats) -> dict[in
     layers, last = stretches.layers, stretches.cracks[begin + counts - 1]
     vertices[inner - 1] = layers.loops.vertices[stretches.cracks[index]]
     vertices[first[1:] - 2] = vertices[first[1:] - 1] = layers.loops.vertices[last]
-    paths = HiddenPaths(layers.cover, stretches.rank[hidden], layers.has_holes, first, goals, vertices)
-    return dict(zip(hidden.tolist(), paths.corners(), strict=True))
+    ranks, bounds = stretches.rank[hidden].tolist(), zip(first[:-1].tolist(), first[1:].tolist(), strict=True)
+    return {
+        number: hidden_path(layers.cover, rank, layers.has_holes, goals[low:high], vertices[low:high])
+        for number, rank, (low, high) in zip(hidden.tolist(), ranks, bounds, strict=True)
+    }

@@ -14,7 +14,7 @@ from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, unchecked
+from warpsplat.drawing.trace.grids import Bools, Ints, at_pixels, unchecked
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
@@ -51,7 +51,7 @@ class Traced:
     """``Joint`` of each control point, shape (point,)."""
 
 
-RUNS_TOGETHER = 2000
+RUNS_TOGETHER = 250
 """Parts of outlines to which curves are fitted from one check to the next."""
 
 
@@ -146,7 +146,7 @@ def _fitted(
         for region, outline in outlines
     ]
     runs = [part for _, outline in scaled for part in outline if isinstance(part, Polyline)]
-    tolerances = [TOLERANCE + _doubt_along(partition.doubt, run.points) for run in runs]
+    tolerances = [TOLERANCE + float(at_pixels(partition.doubt, run.points).mean()) for run in runs]
     curves = list[Pieces]()
     for first in range(0, len(runs), RUNS_TOGETHER):
         check()
@@ -158,13 +158,6 @@ def _fitted(
         for region, outline in scaled
     ]
     return [(region, contour) for region, contour in found if contour and len(contour.cubics) > 1]
-
-
-def _doubt_along(doubt: Floats, points: Floats) -> float:
-    """Return the mean doubt of the pixels that points are in."""
-    height, width = doubt.shape
-    x, y = np.floor(points).astype(np.intp).T
-    return float(doubt[y.clip(0, height - 1), x.clip(0, width - 1)].mean())
 
 
 def _layers(partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
