@@ -3,7 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.drawing.cubic import ZERO, point_at, polynomial
+from warpsplat.kernels.drawing.cubic import point_at, polynomial
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -21,7 +21,7 @@ def meet(a: wp.vec2d, b: wp.vec2d, c: wp.vec2d, d: wp.vec2d) -> wp.bool:
         return False
     if wp.max(a[1], b[1]) < wp.min(c[1], d[1]) or wp.max(c[1], d[1]) < wp.min(a[1], b[1]):
         return False
-    return side(a, b, c) * side(a, b, d) < ZERO and side(c, d, a) * side(c, d, b) < ZERO
+    return side(a, b, c) * side(a, b, d) < wp.float64(0.0) and side(c, d, a) * side(c, d, b) < wp.float64(0.0)
 
 
 @wp.kernel

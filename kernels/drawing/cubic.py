@@ -8,11 +8,6 @@ from warpsplat.kernels import constants
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-ZERO = wp.constant(wp.float64(0.0))
-ONE = wp.constant(wp.float64(1.0))
-TWO = wp.constant(wp.float64(2.0))
-THREE = wp.constant(wp.float64(3.0))
-SIX = wp.constant(wp.float64(6.0))
 TINY = wp.constant(wp.float64(1.0e-12))
 
 corners: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float64)
@@ -26,9 +21,9 @@ def polynomial(cubics: wp.array[wp.vec2d], index: wp.int32) -> corners:
     b = cubics[4 * index + 1]
     c = cubics[4 * index + 2]
     d = cubics[4 * index + 3]
-    p = THREE * (b - a)
-    q = THREE * (c - TWO * b + a)
-    r = d - THREE * c + THREE * b - a
+    p = wp.float64(3.0) * (b - a)
+    q = wp.float64(3.0) * (c - wp.float64(2.0) * b + a)
+    r = d - wp.float64(3.0) * c + wp.float64(3.0) * b - a
     return corners(a[0], a[1], p[0], p[1], q[0], q[1], r[0], r[1])
 
 
@@ -45,8 +40,8 @@ def point_at(f: corners, t: wp.float64) -> wp.vec2d:
 def slope_at(f: corners, t: wp.float64) -> wp.vec2d:
     """Return the derivative by ``t``."""
     return wp.vec2d(
-        (THREE * f[3, 0] * t + TWO * f[2, 0]) * t + f[1, 0],
-        (THREE * f[3, 1] * t + TWO * f[2, 1]) * t + f[1, 1],
+        (wp.float64(3.0) * f[3, 0] * t + wp.float64(2.0) * f[2, 0]) * t + f[1, 0],
+        (wp.float64(3.0) * f[3, 1] * t + wp.float64(2.0) * f[2, 1]) * t + f[1, 1],
     )
 
 
@@ -57,7 +52,10 @@ def nearest_at(f: corners, place: wp.vec2d, start: wp.float64, rounds: wp.int32)
     for _ in range(rounds):
         away = point_at(f, t) - place
         speed = slope_at(f, t)
-        bend = wp.vec2d(SIX * f[3, 0] * t + TWO * f[2, 0], SIX * f[3, 1] * t + TWO * f[2, 1])
-        second = wp.dot(speed, speed) + wp.max(wp.dot(away, bend), ZERO)
-        t = wp.clamp(t - wp.dot(away, speed) / wp.max(second, TINY), ZERO, ONE)
+        bend = wp.vec2d(
+            wp.float64(6.0) * f[3, 0] * t + wp.float64(2.0) * f[2, 0],
+            wp.float64(6.0) * f[3, 1] * t + wp.float64(2.0) * f[2, 1],
+        )
+        second = wp.dot(speed, speed) + wp.max(wp.dot(away, bend), wp.float64(0.0))
+        t = wp.clamp(t - wp.dot(away, speed) / wp.max(second, TINY), wp.float64(0.0), wp.float64(1.0))
     return t

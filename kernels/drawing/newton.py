@@ -8,7 +8,7 @@ those of cubic ``i`` are ``6 i`` to ``6 i + 5``. The matrix from free numbers to
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.drawing.cubic import ONE, THREE, TWO, ZERO, point_at, polynomial
+from warpsplat.kernels.drawing.cubic import point_at, polynomial
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -16,13 +16,13 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 @wp.func
 def bernstein(k: wp.int32, t: wp.float64) -> wp.float64:
     """Return the weight of control point ``k`` at ``t``."""
-    s = ONE - t
+    s = wp.float64(1.0) - t
     if k == 0:
         return s * s * s
     if k == 1:
-        return THREE * s * s * t
+        return wp.float64(3.0) * s * s * t
     if k == 2:
-        return THREE * s * t * t
+        return wp.float64(3.0) * s * t * t
     return t * t * t
 
 
@@ -44,7 +44,7 @@ def derivatives(
     i = offset + wp.tid()
     f = polynomial(cubics, i)
     for s in range(int(first[i]), int(first[i + 1])):
-        w = TWO * weight[s]
+        w = wp.float64(2.0) * weight[s]
         u = across[s]
         force = w * wp.dot(point_at(f, t[s]) - place[s], u)
         n = int(0)
@@ -86,11 +86,11 @@ def push(
 ):
     """Set ``force`` to the change of the gradient when the coordinates of some cubics are ``moved``."""
     for n in range(6 * begin, 6 * end):
-        force[n] = ZERO
+        force[n] = wp.float64(0.0)
     for i in range(begin, end):
         for j in range(4):
-            x = ZERO
-            y = ZERO
+            x = wp.float64(0.0)
+            y = wp.float64(0.0)
             for k in range(4):
                 n = corner(i, k, following)
                 b = pair(j, k)
@@ -152,7 +152,7 @@ def solve(
         diagonal[c] = diagonal[c] + v * v * moved[r]
         added[c] = added[c] + v * v * force[r]
         residual[c] = residual[c] - v * gradient[r]
-    size = ZERO
+    size = wp.float64(0.0)
     for n in range(6 * begin, 6 * end):
         added[n] = added[n] + least
         diagonal[n] = diagonal[n] + added[n]
@@ -163,7 +163,7 @@ def solve(
     done = int(0)
     while done < iterations and size > converged * start:
         for n in range(6 * begin, 6 * end):
-            moved[n] = ZERO
+            moved[n] = wp.float64(0.0)
             pushed[n] = added[n] * way[n]
         for e in range(e0, e1):
             r = int(row[e])
@@ -172,11 +172,11 @@ def solve(
         for e in range(e0, e1):
             c = int(column[e])
             pushed[c] = pushed[c] + value[e] * force[int(row[e])]
-        length = ZERO
+        length = wp.float64(0.0)
         for n in range(6 * begin, 6 * end):
             length += way[n] * pushed[n]
         length = size / length
-        after = ZERO
+        after = wp.float64(0.0)
         for n in range(6 * begin, 6 * end):
             found[n] = found[n] + length * way[n]
             residual[n] = residual[n] - length * pushed[n]

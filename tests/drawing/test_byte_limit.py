@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import cv2
@@ -9,8 +10,7 @@ import numpy as np
 import pytest
 
 from tests.runs import scored, vectorize
-from warpsplat.drawing.byte_limit import DEAREST, PRICE_STEP, PRICES, Sketch, best_within
-from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.draw import DEARER, TRIES, within
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.problem import Fit
 from warpsplat.fit.settings import make_settings
@@ -65,51 +65,34 @@ def test_outlines_get_simpler_before_regions_go(device: str) -> None:
     assert scored(made).psnr > 25, "without one of the discs it is 12"
 
 
-def sketch(regions: int, size: int, psnr: float) -> Sketch:
-    """A drawing of so many regions, as far as its size is concerned."""
-    scene = trace(squares()).scene.take(np.arange(regions))
-    nothing = np.zeros(len(scene.points), np.int32)
-    return Sketch(Fit(scene, 1.0, psnr, psnr, 0, False), size, Drawing(scene, nothing))
+def of_size(size: float) -> Fit:
+    """A drawing of so many bytes, as far as the search is concerned."""
+    return Fit(trace(squares()).scene, size, math.nan, math.nan, 0, False)
 
 
-def test_what_shows_more_is_taken() -> None:
-    """Of fewer nodes and of fewer regions."""
-    asked: list[tuple[int, float]] = []
-
-    def priced(worth: float) -> Callable[[Drawing, float], Sketch]:
-        def again(drawing: Drawing, price: float) -> Sketch:
-            count = len(drawing.scene)
-            asked.append((count, price))
-            return sketch(count, round(1000 - 150 * np.log2(price)), worth)
-
-        return again
-
-    def drawn(count: int) -> Sketch:
-        return sketch(count, 125 * count, 20.0 + count)
-
-    for worth, regions in ((30.0, 8), (21.0, 4)):
-        asked.clear()
-        made = best_within(drawn(8), 600, drawn, priced(worth), lambda: False)
-        assert len(made.scene) == regions
-        assert made.render_psnr == (30.0 if regions == 8 else 24.0)
-        prices = [price for count, price in asked if count == 8]
-        assert prices[:2] == [PRICE_STEP, PRICE_STEP**0.5], "what has room left is made less simple"
-        assert len(prices) <= PRICES
-
-
-def test_where_nothing_fits_the_smallest_is_taken() -> None:
-    """Every price is tried once for each of two drawings."""
+def within_600(size: Callable[[float], float]) -> tuple[float, list[float]]:
+    """Return the size of the drawing within 600 bytes, and the prices that were tried."""
     asked: list[float] = []
 
-    def again(drawing: Drawing, price: float) -> Sketch:
+    def draw(price: float) -> Fit:
         asked.append(price)
-        return sketch(len(drawing.scene), 900, 30.0)
+        return of_size(size(price))
 
-    made = best_within(
-        sketch(2, 1000, 40.0), 10, lambda count: sketch(count, 500, 10.0), again, lambda: False
-    )
-    assert len(made.scene) == 1
-    assert asked == 2 * [8.0, 64.0, 512.0, DEAREST]
+    made = within(600, of_size(1000), draw, lambda made: round(made.per_pixel), 1.0, lambda: False)
+    return made.per_pixel, asked
+
+
+def test_the_least_price_is_taken_at_which_a_drawing_fits() -> None:
+    size, asked = within_600(lambda price: 1000 - 150 * np.log2(price))
+    assert asked[:3] == [8.0, 8.0**0.5, 8.0**0.75]
+    assert 590 < size <= 600
+    assert len(asked) <= TRIES
+
+
+def test_where_nothing_fits_the_dearest_is_taken() -> None:
+    size, asked = within_600(lambda price: 900 - price / DEARER**TRIES)
+    assert size == 899
+    assert asked == [DEARER ** (1 + k) for k in range(TRIES)]
 
 
 def test_a_size_leaves_drawings_what_they_are() -> None:

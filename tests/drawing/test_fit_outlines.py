@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.drawing.drawings import BLUE, RED, WHITE, disc, drawing, logo, outline, polygon, seam
-from tests.scenes import with_gradients
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
@@ -109,17 +108,6 @@ def test_an_opaque_picture_on_a_transparent_canvas(device: str) -> None:
     found = fitted(target, replace(exact, scene=off), backend)
     whole = np.concatenate([target, np.ones_like(target[..., :1])], axis=2)
     assert psnr(found, whole, backend) > psnr(off, whole, backend) + 3
-
-
-def test_gradients_are_fitted_and_stay_as_opaque_as_they_are(device: str) -> None:
-    backend = Backend.on(device)
-    exact = logo()
-    ramps = with_gradients(exact.scene)
-    target = render(ramps, backend=backend)
-    off = replace(ramps, frames=ramps.frames + np.float32(0.7) * (ramps.frames != 0))
-    found = fitted(target, replace(exact, scene=off), backend)
-    assert psnr(found, target, backend) > psnr(off, target, backend) + 3
-    np.testing.assert_array_equal(found.stop_opacities, ramps.stop_opacities)
 
 
 @pytest.mark.parametrize("background", [WHITE, None])

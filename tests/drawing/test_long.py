@@ -29,7 +29,7 @@ def test_it_says_how_many_nodes_take_how_long(
 ) -> None:
     made = drawing(Canvas(64, 64, WHITE), (RED, [disc(32, 32, 9)] * discs))
     with caplog.at_level(logging.WARNING):
-        announce_fit(len(made.joints) // 3, Picture.of(np.ones((64, 64, 3), np.float32)), Settings())
+        announce_fit(len(made.joints) // 3, Settings())
     assert ["12,000 nodes takes about 7 s" in message for message in caplog.messages] == [True] * is_long
 
 
@@ -51,7 +51,7 @@ def test_a_trace_ends_in_time_by_fewer_pixels(
     monkeypatch.setattr(draft, "QUICK_PIXELS", 1000)
     image = draw(LOGO)
     run = Run(lambda: pytest.fail("a trace needs no device"), deadline=time_left)
-    made = draft.trace_in_time(image, None, None, Settings(), run).scene
+    made = draft.trace_in_time(image, None, None, 1.0, Settings(), run).scene
     small = trace(boxed(image, factor) if factor > 1 else image).scene
     assert (made.points == factor * small.points).all()
     assert (made.canvas.width, made.canvas.height) == image.shape[1::-1]
@@ -61,7 +61,7 @@ def test_a_trace_that_is_stopped_is_one_of_few_pixels(monkeypatch: pytest.Monkey
     monkeypatch.setattr(draft, "QUICK_PIXELS", 1000)
     image, stops = draw(LOGO), itertools.count()
     run = Run(lambda: pytest.fail("a trace needs no device"), stop=lambda: next(stops) >= 4)
-    made = draft.trace_in_time(image, None, None, Settings(), run).scene
+    made = draft.trace_in_time(image, None, None, 1.0, Settings(), run).scene
     assert (made.points == 4 * trace(boxed(image, 4)).scene.points).all()
 
 

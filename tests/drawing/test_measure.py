@@ -113,7 +113,7 @@ def test_outlines_follow_their_places() -> None:
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
     samples = fit.places()
     before = errors(samples, fit.drawing.cubics()).sum()
-    every = np.ones(len(fit.drawing.scene.starts) - 1, np.bool_)
+    every = np.arange(len(fit.drawing.scene.starts) - 1)
     after = fitted(samples, fit.drawing, fit.least, every)
     assert after[2].sum() < 0.1 * before
     again = OutlineFit(render(made.scene), after[0], Run(Backend.on("cpu", 1)))

@@ -25,7 +25,7 @@ Outlines = dict[int, tuple[npt.NDArray[np.floating], npt.NDArray[np.integer]]]
 
 
 @dataclass(frozen=True)
-class Change:
+class Alternative:
     """Other points and joints for some contours."""
 
     contours: Outlines
@@ -36,17 +36,17 @@ class Change:
     """Bytes."""
 
 
-def contour_change(drawing: Drawing, contours: Outlines, saved: float) -> Change:
+def contour_change(drawing: Drawing, contours: Outlines, saved: float) -> Alternative:
     """Return the change of a drawing's contours."""
     old = np.isin(drawing.contour(), list(contours))
     made = [
         with_ends(points.astype(np.float64), np.roll(np.arange(len(points) // 3), -1))
         for points, _ in contours.values()
     ]
-    return Change(contours, np.concatenate([drawing.cubics()[old], *made]), saved)
+    return Alternative(contours, np.concatenate([drawing.cubics()[old], *made]), saved)
 
 
-def changed(drawing: Drawing, changes: Sequence[Change]) -> Drawing:
+def changed(drawing: Drawing, changes: Sequence[Alternative]) -> Drawing:
     """Return a drawing with changes."""
     scene = drawing.scene
     starts = scene.starts.tolist()
@@ -63,8 +63,8 @@ def changed(drawing: Drawing, changes: Sequence[Change]) -> Drawing:
 
 
 def worthwhile(
-    target: FloatArray, drawing: Drawing, run: Run, changes: Sequence[Change], worth: float
-) -> list[Change]:
+    target: FloatArray, drawing: Drawing, run: Run, changes: Sequence[Alternative], worth: float
+) -> list[Alternative]:
     """Return the changes by which the error around them grows less than their bytes are worth.
 
     Args:

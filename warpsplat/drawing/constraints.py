@@ -34,6 +34,9 @@ MIN_HANDLE = 0.05
 """[canvas units] a handle of length 0 would have no direction, and the joint would be a corner."""
 
 
+SIDES = tuple(enumerate((-1.0, 1.0)))
+"""Before and after a joint: number, and sign along the outline."""
+
 DRAFT_GRID = 8.0
 """View box units per pixel of a draft, and until the grid is chosen: a trace is no nearer to the image."""
 
@@ -60,8 +63,8 @@ class Drawing:
         points = ranges(self.scene.first[:-1][index], self.scene.point_counts()[index])
         return Drawing(self.scene.take(index), self.joints[points])
 
-    def contours(self, chosen: Flags) -> Drawing:
-        """Return the ``chosen`` contours, shape (contour,), as one shape."""
+    def contours(self, chosen: Links) -> Drawing:
+        """Return contours as one shape."""
         counts = np.diff(self.scene.starts)[chosen]
         points = ranges(self.scene.starts[:-1][chosen], counts)
         scene = replace(
@@ -221,6 +224,16 @@ class Constraints:
         length = np.linalg.norm(axis, axis=1)[:, None]
         return np.asarray(np.where(length > MIN_LENGTH, axis / np.maximum(length, MIN_LENGTH), 0.0))
 
+    def _bends(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the direction at each joint, 0 unless it is bent, and the lengths of its handles."""
+        along, lengths = np.zeros((2, len(points) // 3, 2))
+        along[self._bent] = self.directions(points)
+        for side, sign in SIDES:
+            joints, handles = self._handles(side)
+            reach = (points[handles] - points[3 * joints]) * along[joints]
+            lengths[joints, side] = sign * reach.sum(axis=1)
+        return along, lengths
+
     def shared(self, points: Floats) -> Floats:
         """Return ``points``, shape (point, 2), with the coordinates that they have in common."""
         return points.ravel()[self._name].reshape(-1, 2)
@@ -228,14 +241,13 @@ class Constraints:
     def project(self, points: Floats) -> Floats:
         """Return ``points``, shape (point, 2), with the constraints kept exactly."""
         points = self.shared(points)
-        along = np.zeros((len(points) // 3, 2))
-        along[self._bent] = self.directions(points)
-        for side, sign in ((0, -1.0), (1, 1.0)):
+        along, lengths = self._bends(points)
+        for side, sign in SIDES:
             joints, handles = self._handles(side)
-            p, u = points[3 * joints], along[joints]
-            length = np.maximum(sign * ((points[handles] - p) * u).sum(axis=1), MIN_HANDLE)
-            known = u.any(axis=1)
-            points[handles[known]] = (p + sign * length[:, None] * u)[known]
+            known = along[joints].any(axis=1)
+            j, h = joints[known], handles[known]
+            length = np.maximum(lengths[j, side, None], MIN_HANDLE)
+            points[h] = points[3 * j] + sign * length * along[j]
         begun = points.reshape(-1, 3, 2)
         a, b = begun[self._is_line, 0], begun[self._next[self._is_line], 0]
         begun[self._is_line, 1:] = np.stack([a + (b - a) / 3, b - (b - a) / 3], axis=1)
@@ -263,15 +275,8 @@ class Constraints:
         for handle, share in ((1, 1 / 3), (2, 2 / 3)):
             add(3 * line + handle, 3 * line, np.full(len(line), 1 - share))
             add(3 * line + handle, 3 * self._next[line], np.full(len(line), share))
-        along = np.zeros((len(points) // 3, 2))
-        along[self._bent] = self.directions(points)
-        lengths = np.zeros((len(points) // 3, 2))
-        for side, sign in ((0, -1.0), (1, 1.0)):
-            joints, handles = self._handles(side)
-            lengths[joints, side] = sign * ((points[handles] - points[3 * joints]) * along[joints]).sum(
-                axis=1
-            )
-        for side, sign in ((0, -1.0), (1, 1.0)):
+        along, lengths = self._bends(points)
+        for side, sign in SIDES:
             joints, handles = self._handles(side)
             u = along[joints]
             n = np.stack([-u[:, 1], u[:, 0]], axis=1)

@@ -27,8 +27,8 @@ from warpsplat.scene.geometry import enlarged
 TRACE_SHARE = 0.75
 """Share of the time left that a trace may take before one of fewer pixels begins."""
 
-QUICK_PIXELS, QUICK_SECONDS = 131_072, 1.0
-"""Pixels of the coarsest trace, which always ends, and the time that is kept for it [s]."""
+QUICK_PIXELS = 131_072
+"""Pixels of the coarsest trace, which always ends."""
 
 DEAREST = 64.0
 """Price of a byte over its usual one with the least detail; with the most it is one over that."""
@@ -49,33 +49,31 @@ def byte_price(settings: Settings) -> float:
 
 
 def trace_in_time(
-    image: FloatArray, noise: float | None, most: int | None, settings: Settings, run: Run
+    image: FloatArray, noise: float | None, most: int | None, price: float, settings: Settings, run: Run
 ) -> Traced:
     """Trace an image, at a lower resolution if the run's time is too short or the run is stopped.
 
-    ``noise`` and ``most``: as for ``trace``.
+    ``noise``, ``most`` and ``price``: as for ``trace``.
     """
     height, width = image.shape[:2]
 
     def traced(factor: int, check: Callable[[], None]) -> Traced:
         small = boxed(image, factor) if factor > 1 else image
-        price, gradients = byte_price(settings), DRAWN_GRADIENTS[settings.paint or "auto"]
+        gradients = DRAWN_GRADIENTS[settings.paint or "auto"]
         found = trace(small, most=most, price=price, check=check, gradients=gradients, noise=noise)
         return replace(found, scene=enlarged(found.scene, factor, width, height))
 
     least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))
-    early = run.derived(deadline=run.deadline - QUICK_SECONDS)
     for factor in range(1, min(least, 3)):
         with contextlib.suppress(Stopped):
-            return traced(factor, early.within(TRACE_SHARE).check)
+            return traced(factor, run.within(TRACE_SHARE).check)
     return traced(least, unchecked)
 
 
 def draw_pixels(problem: Problem, run: Run) -> Fit:
     """Trace pixel art, a shape for each area of cells of one colour."""
     scene, per_pixel = trace_pixels(problem.target, solid_color(problem.settings.background))
-    if problem.settings.is_limited:
-        scene = limited(scene.take(solid_shapes(scene)), problem.settings)
+    scene = limited(scene, problem.settings)
     return replace(as_fit(scene, per_pixel, problem, run), interrupted=False)
 
 
@@ -87,5 +85,8 @@ def as_fit(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
 
 def limited(scene: Scene, settings: Settings) -> Scene:
     """Return ``scene`` in the colours that the settings allow."""
+    if not settings.is_limited:
+        return scene
+    scene = scene.take(solid_shapes(scene))
     palette = Palette.of_scene(settings, scene)
     return palette.limited(scene) if palette else scene

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
-from warpsplat.drawing.byte_limit import Sketch, best_within
 from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import Sheet
@@ -16,7 +15,7 @@ from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.drawing.optics import without_optics
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
-from warpsplat.drawing.thin import THIN_SIDE, best_of_thin, continued, cut, margins
+from warpsplat.drawing.thin import TRACED_PSNR
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.palette import solid_shapes
@@ -26,11 +25,8 @@ from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray, Scene
 
-SECONDS_PER_TRACED = 4e-6
-"""Rough time of tracing a pixel on one core [s]."""
-
-SECONDS_PER_NODE, SECONDS_PER_PIXEL = 5.5e-4, 1.5e-6
-"""Rough time of fitting a trace on one core [s]."""
+SECONDS_PER_PIXEL, SECONDS_PER_NODE = 4e-6, 5.5e-4
+"""Rough time of tracing a pixel, and of fitting a node, on one core [s]."""
 
 SECONDS_PER_WRITTEN = 6e-5
 """Rough time of writing a node [s]."""
@@ -38,50 +34,10 @@ SECONDS_PER_WRITTEN = 6e-5
 LONG = 4.0
 """Time from which on it is announced [s]."""
 
+DEARER, TRIES = 8.0, 9
+"""The factor from one price of a byte to the next, and how many are tried, to draw within a size."""
+
 log = logging.getLogger(__name__)
-
-
-def draw_regions(problem: Problem, run: Run) -> Fit:
-    """Trace an image as flat regions and gradients, within ``max_bytes`` by fewer regions or nodes.
-
-    A draft, which is not tidied, is the trace, and needs no Warp.
-    """
-    settings, limit = problem.settings, problem.settings.max_bytes
-    most = None if settings.simplify else settings.curves
-    picture = Picture.of(problem.target)
-    announce_trace(picture, settings)
-    picture, found = _sharp(picture, settings, run, most)
-    if found.sheet:
-        made = _drawn_with_sheet(picture, settings, run, found)
-        if not limit or _size(made, settings) <= limit:
-            return made
-        found = _traced(picture.pixels, picture.noise, settings, run, most, has_sheet=False)
-    traced = found.drawing
-    if not run.over():
-        announce_fit(len(traced.joints) // 3, picture, settings)
-    run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(traced.joints) / 3)
-    parts = run.open_parts(share=0.5 if limit else 1.0)
-    negligible = LEAST_ERROR * picture.drawn_share
-    finish = partial(_finish, settings, picture.pixels, negligible=negligible, seen=picture.seen)
-
-    def sketch_of(done: Finished, most: int | None) -> Sketch:
-        sketch = _sketch(problem, picture, run, done)
-        best = _best_if_thin(problem, picture, next(parts), sketch.fit, most)
-        return sketch if best is sketch.fit else Sketch(best, _size(best, settings), None)
-
-    def fewer(count: int) -> Sketch:
-        return sketch_of(
-            finish(trace_regions(picture.pixels, picture.noise, settings, run, count), next(parts)), count
-        )
-
-    def simpler(drawing: Drawing, price: float) -> Sketch:
-        done = finish(drawing, next(parts), price=price * byte_price(settings))
-        return _sketch(problem, picture, run, done)
-
-    first = sketch_of(finish(traced, next(parts)), most)
-    if not limit or first.size <= limit:
-        return first.fit
-    return replace(best_within(first, limit, fewer, simpler, run.over), interrupted=run.stopped())
 
 
 @dataclass(frozen=True)
@@ -98,32 +54,99 @@ class _Trace:
     glyphs: Drawing | None = None
 
 
+def draw_regions(problem: Problem, run: Run) -> Fit:
+    """Trace an image as flat regions and gradients; within ``max_bytes`` at a higher price of a byte.
+
+    A draft, which is not tidied, is the trace, and needs no Warp.
+    """
+    settings, limit = problem.settings, problem.settings.max_bytes
+    most = None if settings.simplify else settings.curves
+    picture, price = Picture.of(problem.target), byte_price(settings)
+    announce_trace(picture, settings)
+    picture, found = _sharp(picture, settings, run, most)
+    if not run.over():
+        announce_fit(sum(len(part.joints) for part in (found.drawing, found.glyphs) if part) // 3, settings)
+    run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * len(found.scene.points) / 3)
+    parts = run.open_parts(share=0.5 if limit else 1.0)
+
+    def drawn(found: _Trace, price: float) -> Fit:
+        made = _drawn(picture, found, settings, next(parts), price)
+        if picture.is_thin and most is None:
+            made = as_fit(made.scene, made.per_pixel, problem, run)
+            if made.render_psnr < TRACED_PSNR:
+                made = max(draw_pixels(problem, run), made, key=lambda each: each.render_psnr)
+        return made
+
+    def again(price: float) -> Fit:
+        return drawn(_traced(picture, settings, run, most, price, has_sheet=False), price)
+
+    def size(made: Fit) -> int:
+        return len(finished(made.scene, settings, made.per_pixel).encode())
+
+    first = drawn(found, price)
+    if not limit or size(first) <= limit:
+        return first
+    return replace(within(limit, first, again, size, price, run.over), interrupted=run.stopped())
+
+
+def within(
+    most: int,
+    first: Fit,
+    draw: Callable[[float], Fit],
+    size: Callable[[Fit], int],
+    price: float,
+    over: Callable[[], bool],
+) -> Fit:
+    """Return a drawing within ``most`` bytes at the least price of a byte, or a small one if none fits.
+
+    Args:
+        most: Bytes.
+        first: The drawing at ``price``, which is too large.
+        draw: Draws at a price.
+        size: Returns the bytes of a drawing's file.
+        price: Of a byte, over its usual one.
+        over: Returns whether to take the best so far.
+    """
+    best, low, high = first, price, math.inf
+    for _ in range(TRIES):
+        if over():
+            break
+        price = math.sqrt(low * high) if high < math.inf else DEARER * low
+        made = draw(price)
+        if size(made) <= most:
+            best, high = made, price
+        else:
+            best, low = made if high == math.inf else best, price
+    return best
+
+
 def _traced(
-    pixels: FloatArray,
-    noise: float | None,
-    settings: Settings,
-    run: Run,
-    most: int | None,
-    *,
-    has_sheet: bool = True,
+    picture: Picture, settings: Settings, run: Run, most: int | None, price: float, *, has_sheet: bool = True
 ) -> _Trace:
-    """Trace an image; its glyphs on a sheet, if it has some and may have (``has_sheet``)."""
-    sheet, rest = find_glyphs(pixels) if has_sheet else (None, pixels)
+    """Trace a picture; its glyphs on a sheet, if it has some and may have (``has_sheet``)."""
+
+    def trace(pixels: FloatArray, most: int | None) -> Drawing:
+        traced = trace_in_time(pixels, picture.noise, most, price, settings, run)
+        drawing = Drawing(traced.scene, traced.joints)
+        if settings.is_limited:
+            drawing = drawing.take(solid_shapes(drawing.scene))
+        return replace(drawing, scene=limited(drawing.scene, settings))
+
+    sheet, rest = find_glyphs(picture.pixels) if has_sheet else (None, picture.pixels)
     if sheet:
-        glyphs, others = sheet.trace(), trace_regions(rest, noise, settings, run, None)
+        glyphs, others = sheet.trace(), trace(rest, None)
         scene = sheet.placed(glyphs.scene, others.scene)
         if most is None or len(scene) <= most:
             return _Trace(others, rest, scene, sheet, Drawing(glyphs.scene, glyphs.joints))
-    drawing = trace_regions(pixels, noise, settings, run, most)
-    return _Trace(drawing, pixels, drawing.scene)
+    drawing = trace(picture.pixels, most)
+    return _Trace(drawing, picture.pixels, drawing.scene)
 
 
 def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, _Trace]:
     """Return a picture as it was before it was blurred or sharpened, and its trace."""
-    has_sheet = not any(margins(picture.pixels, THIN_SIDE))
 
     def trace(pixels: FloatArray) -> _Trace:
-        return _traced(pixels, picture.noise, settings, run, most, has_sheet=has_sheet)
+        return _traced(replace(picture, pixels=pixels), settings, run, most, byte_price(settings))
 
     def show(found: _Trace) -> FloatArray:
         text = finished(found.scene, settings, DRAFT_GRID)
@@ -134,8 +157,31 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
     return replace(picture, pixels=pixels, seen=seen), found
 
 
+def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price: float) -> Fit:
+    """Finish a trace, the glyphs first, on whose grid is the rest then, at the size of the whole image."""
+    usual = byte_price(settings)
+    # What is not worth a region is not worth a node.
+    negligible = LEAST_ERROR * picture.drawn_share * price / usual
+    options: dict[str, Any] = {"negligible": negligible, "price": usual}
+    if found.sheet and found.glyphs:
+        runs = run.open_parts()
+        glyphs = _finish(settings, found.sheet.image, found.glyphs, next(runs), **options)
+        done = _finish(settings, found.rest, found.drawing, next(runs), grid=glyphs.per_pixel, **options)
+        scene = limited(found.sheet.placed(glyphs.drawing.scene, done.drawing.scene), settings)
+    else:
+        done = _finish(settings, found.rest, found.drawing, run, seen=picture.seen, **options)
+        scene = done.drawing.scene
+    scene = picture.placed(scene)
+    if settings.strokes and settings.tidy and not run.over():
+        from warpsplat.drawing.pen import with_strokes
+
+        scene = with_strokes(scene, settings, run)
+    psnr = done.psnr - 10 * float(elementary.log10(picture.share))
+    return Fit(scene, done.per_pixel / picture.enlargement, psnr, psnr, 0, run.stopped())
+
+
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
-    """Finish a drawing as ``finish_by_lightness``, as the settings say where ``options`` do not.
+    """Finish a drawing as ``finish_by_lightness``, with what the settings say beside ``options``.
 
     A draft stays as it is.
     """
@@ -143,47 +189,20 @@ def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, 
         return Finished(drawing, min(DRAFT_GRID, finest(settings)))
     from warpsplat.drawing.chroma import finish_by_lightness
 
-    usual = {"finest": finest(settings), "price": byte_price(settings), "symbols": settings.symbols}
-    return finish_by_lightness(target, drawing, run, **(usual | options))
-
-
-def _drawn_with_sheet(picture: Picture, settings: Settings, run: Run, found: _Trace) -> Fit:
-    """Draw the glyphs of an image, and the rest of it, on the grid that is right for what has most nodes."""
-    sheet, glyphs, others, rest = found.sheet, found.glyphs, found.drawing, found.rest
-    assert sheet and glyphs
-    copies = len(sheet.copies) / len(sheet.corners)
-    parts = [(glyphs, sheet.image, copies), (others, rest, 1.0)]
-    nodes = [len(drawing.joints) / 3 * times for drawing, _, times in parts]
-    if not run.over():
-        announce_fit(sum(len(drawing.joints) for drawing, *_ in parts) // 3, picture, settings)
-    run = run.derived(deadline=run.deadline - SECONDS_PER_WRITTEN * sum(nodes))
-    scenes: list[Scene] = []
-    grid, runs = None, run.open_parts()
-    glyphs_first = nodes[0] >= nodes[1]
-    for drawing, image, times in parts if glyphs_first else parts[::-1]:
-        # What does not count in all of the image, in pixels of this part.
-        share = picture.drawn_share * rest[..., 0].size / (times * image[..., 0].size)
-        negligible = LEAST_ERROR * max(share, picture.drawn_share)
-        done = _finish(settings, image, drawing, next(runs), grid=grid, negligible=negligible)
-        grid = done.per_pixel
-        scenes.append(done.drawing.scene)
-    scene = sheet.placed(*(scenes if glyphs_first else scenes[::-1]))
-    if settings.is_limited:
-        scene = limited(scene.take(solid_shapes(scene)), settings)
-    scene, per_pixel = _whole(scene, done.per_pixel, picture, settings, run)
-    return Fit(scene, per_pixel, math.nan, math.nan, 0, run.stopped())
+    return finish_by_lightness(
+        target, drawing, run, finest=finest(settings), symbols=settings.symbols, **options
+    )
 
 
 def announce_trace(picture: Picture, settings: Settings) -> None:
     """Say so if the trace of a picture will take long."""
     pixels = picture.pixels[..., 0].size
-    _announce(settings, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_TRACED * pixels)
+    _announce(settings, f"tracing its {pixels / 1e6:.1f} megapixels", SECONDS_PER_PIXEL * pixels)
 
 
-def announce_fit(nodes: int, picture: Picture, settings: Settings) -> None:
+def announce_fit(nodes: int, settings: Settings) -> None:
     """Say so if the fit of a drawing with so many traced nodes will take long."""
-    seconds = SECONDS_PER_NODE * nodes + SECONDS_PER_PIXEL * picture.pixels[..., 0].size
-    _announce(settings, f"fitting its {counted(nodes, 'node')}", seconds)
+    _announce(settings, f"fitting its {counted(nodes, 'node')}", SECONDS_PER_NODE * nodes)
 
 
 def _announce(settings: Settings, work: str, seconds: float) -> None:
@@ -191,64 +210,3 @@ def _announce(settings: Settings, work: str, seconds: float) -> None:
     if seconds > LONG and settings.time_budget is None and settings.tidy:
         how = "--time-budget or --quality draft make it shorter"
         log.warning("%s takes about %.0f s; %s", work, seconds, how)
-
-
-def _best_if_thin(problem: Problem, picture: Picture, run: Run, made: Fit, most: int | None) -> Fit:
-    """Return the drawing or, for an image of few rows or columns, a better one if there is one."""
-    across, down = margins(picture.pixels, THIN_SIDE)
-    if not (across or down):
-        return made
-    others = [lambda: _drawn_beyond(problem, picture, run, most)]
-    return best_of_thin(made, others if most is not None else [*others, lambda: draw_pixels(problem, run)])
-
-
-def _drawn_beyond(problem: Problem, picture: Picture, run: Run, most: int | None) -> Fit:
-    """Draw the picture continued beyond its borders, and cut the drawing."""
-    across, down = margins(picture.pixels, THIN_SIDE)
-    wide, settings = continued(picture.pixels, across, down), problem.settings
-    drawing = trace_regions(wide, picture.noise, settings, run, most)
-    done = _finish(settings, wide, drawing, run, symbols=False)
-    scene = cut(done.drawing.scene, across, down)
-    return as_fit(*_whole(scene, done.per_pixel, picture, settings, run), problem, run)
-
-
-def trace_regions(
-    image: FloatArray, noise: float | None, settings: Settings, run: Run, most: int | None
-) -> Drawing:
-    """Trace an image, in the colours that are allowed. ``noise`` and ``most``: as for ``trace``."""
-    traced = trace_in_time(image, noise, most, settings, run)
-    drawing = Drawing(traced.scene, traced.joints)
-    if settings.is_limited:
-        drawing = drawing.take(solid_shapes(drawing.scene))
-        drawing = replace(drawing, scene=limited(drawing.scene, settings))
-    return drawing
-
-
-def _sketch(problem: Problem, picture: Picture, run: Run, done: Finished) -> Sketch:
-    """Return a finished drawing at the size of the whole image."""
-    scene, per_pixel = _whole(done.drawing.scene, done.per_pixel, picture, problem.settings, run)
-    settings, is_known = problem.settings, not math.isnan(done.psnr)
-    is_compared = settings.max_bytes or any(margins(picture.pixels, THIN_SIDE))
-    if is_compared or (settings.tidy and not is_known):
-        made = as_fit(scene, per_pixel, problem, run)
-    else:  # nothing to compare it with
-        psnr = done.psnr - 10 * float(elementary.log10(picture.share))
-        made = Fit(scene, per_pixel, psnr, psnr, 0, run.stopped())
-    return Sketch(made, _size(made, settings), done.drawing if settings.tidy else None)
-
-
-def _whole(
-    scene: Scene, per_pixel: float, picture: Picture, settings: Settings, run: Run
-) -> tuple[Scene, float]:
-    """Return a scene of a picture, and its grid, at the size of the image."""
-    scene = picture.placed(scene)
-    if settings.strokes and settings.tidy and not run.over():
-        from warpsplat.drawing.pen import with_strokes
-
-        scene = with_strokes(scene, settings, run)
-    return scene, per_pixel / picture.enlargement
-
-
-def _size(made: Fit, settings: Settings) -> int:
-    """Return the bytes of the file; 0 where they are not limited, and do not count."""
-    return len(finished(made.scene, settings, made.per_pixel).encode()) if settings.max_bytes else 0

@@ -9,14 +9,14 @@ import numpy as np
 
 from warpsplat.drawing.constraints import Constraints, Drawing, Flags, Floats, with_ends
 from warpsplat.drawing.crossings import Crossings
-from warpsplat.drawing.measure import Measure, Samples, is_shaded
+from warpsplat.drawing.measure import Measure, Samples
 from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.metrics import decibels
 from warpsplat.portable import elementary
-from warpsplat.rendering.renderer import Capacity, render
-from warpsplat.scene import Canvas, FloatArray, Paint, Scene
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import Canvas, FloatArray
 
 LEAST_GAIN, MOST_IDLE = 0.005, 4
 """A refinement ends when so many steps in a row have not lowered the least error by this share."""
@@ -28,51 +28,12 @@ where one did, and its least."""
 MOST_STEP = 0.7
 """How far a step may move a point along each free number [px]: measured distances hold about as far."""
 
-FRAME_STEP, FASTER, SLOWER = 0.5, 1.5, 0.4
-"""First step of the places of gradients [px], and its factors where the derivative keeps its sign or not."""
-
 ROAM_RATE, LAST_RATE, LEAST_SIZE = 0.15, 0.012, 1e-12
 """Learning rates of free numbers at the beginning and at the end of ``roam`` [px], and the least size of a
 gradient."""
 
-ROAM_GAIN = 0.02
-"""Least share of the error that half of the steps of ``roam`` take away for the others to follow."""
-
 LOOKS = 8
 """Steps from one measurement of the contrasts to the next."""
-
-
-class Paints:
-    """Fits the places of gradients by the signs of derivatives (Rprop, Riedmiller and Braun 1993)."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.best = scene.frames.astype(np.float64)
-        self._frames, self._last = self.best.copy(), np.zeros_like(self.best)
-        self._step = np.full_like(self.best, FRAME_STEP)
-        along, across = self.best[:, 2:4], self.best[:, 4:]
-        self._round = (scene.paint == Paint.RADIAL) & (across == turned(along)).all(axis=1)
-
-    def moved(self, gradient: Floats) -> Floats:
-        """Return the frames after a step."""
-        gradient = gradient.copy()
-        # Of a circle the second axis follows the first.
-        gradient[self._round, 2:4] -= turned(gradient[self._round, 4:])
-        gradient[self._round, 4:] = 0
-        agrees = gradient * self._last
-        self._step *= np.where(agrees > 0, FASTER, np.where(agrees < 0, SLOWER, 1.0))
-        self._last = gradient
-        self._frames = self._frames - np.sign(gradient) * self._step
-        self._frames[self._round, 4:] = turned(self._frames[self._round, 2:4])
-        return self._frames
-
-    def keep(self) -> None:
-        """Note the frames of the last step as the best."""
-        self.best = self._frames
-
-
-def turned(vectors: Floats) -> Floats:
-    """Return vectors turned by a right angle, shape (vector, 2)."""
-    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
 
 
 class OutlineFit:
@@ -82,9 +43,7 @@ class OutlineFit:
     whether the error around it falls.
     """
 
-    def __init__(
-        self, target: FloatArray, drawing: Drawing, run: Run, capacity: Capacity | None = None
-    ) -> None:
+    def __init__(self, target: FloatArray, drawing: Drawing, run: Run) -> None:
         """Project the points onto the constraints.
 
         Args:
@@ -92,7 +51,6 @@ class OutlineFit:
                 width, 4), of a scene on a transparent canvas.
             drawing: fills of cubics, one at least.
             run: the device.
-            capacity: of the renderer to begin with, if it is known.
 
         Raises:
             ValueError: joints do not fit the scene, or its shapes are not fills of cubics.
@@ -102,24 +60,15 @@ class OutlineFit:
         self.points = self._constraints.project(drawing.scene.points.astype(np.float64))
         self._crossings = Crossings(drawing, self.points)
         target = matching(target, drawing.scene.canvas)
-        self._measure = Measure(target, drawing, self.points, run.backend, capacity)
+        self._measure = Measure(target, drawing, self.points, run.backend)
         self.error, self._around = self._measure.error(self.points)
         self._measure.look()
-        self._paints = Paints(drawing.scene) if is_shaded(drawing.scene).any() else None
 
     @property
     def drawing(self) -> Drawing:
         """The drawing with the least error of those evaluated, the start among them."""
-        return replace(self._drawing, scene=self._scene())
-
-    def _scene(self) -> Scene:
         scene = replace(self._drawing.scene, points=self.points.astype(np.float32))
-        return replace(scene, frames=self._paints.best.astype(np.float32)) if self._paints else scene
-
-    @property
-    def capacity(self) -> Capacity:
-        """Capacity of the renderer's arrays."""
-        return self._measure.capacity
+        return replace(self._drawing, scene=scene)
 
     @property
     def least(self) -> float:
@@ -149,8 +98,6 @@ class OutlineFit:
         damping = np.full(len(self._following), CALMER * RAISED)
         for done in range(1, steps + 1):
             gradient = self._measure.gradient(blurred=done <= far)
-            if self._paints:
-                self._measure.paint(self._paints.moved(self._measure.frames_gradient()))
             if done % LOOKS == 0 and done < steps:
                 self._measure.look()
             freedom = self._constraints.freedom(at)
@@ -160,7 +107,8 @@ class OutlineFit:
             if done <= far:
                 change = 2 * change  # blurred gradients are too small
             change = freedom.times(np.clip(change, -MOST_STEP, MOST_STEP))
-            at, refused = self._moved(at, change)
+            moved = self._constraints.project(at + change.reshape(-1, 2))
+            at, refused = self._crossings.refuse(at, moved, self._constraints)
             error, now = self._measure.error(at)
             damping = np.where(
                 (now <= around) & ~refused, np.maximum(CALMER * damping, LEAST_DAMPING), RAISED
@@ -169,14 +117,10 @@ class OutlineFit:
             idle = 0 if done <= far or error < (1 - LEAST_GAIN) * self.error else idle + 1
             if error < self.error:
                 self.points, self.error, self._around = at, error, now
-                if self._paints:
-                    self._paints.keep()
             if run.on_progress:
                 run.report(self._progress(done, steps, time.monotonic() - run.started))
             if idle >= MOST_IDLE or run.over():
                 break
-        if self._paints:
-            self._measure.paint(self._paints.best)
 
     def roam(self, run: Run, steps: int) -> None:
         """Make so many steps of Adam (Kingma and Ba 2015), half of them where these gain nothing.
@@ -184,7 +128,8 @@ class OutlineFit:
         Where edges are less than a pixel apart, the model of single edges leads to poor minima; steps of one
         length for all, whatever their gradients, lead out of them.
         """
-        start, at, mean, square = (1 - ROAM_GAIN) * self.error, self.points, np.zeros(1), np.zeros(1)
+        start, at = (1 - MOST_IDLE * LEAST_GAIN) * self.error, self.points
+        mean, square = np.zeros((2, 1))
         rate, first, second, checked = ROAM_RATE, 1.0, 1.0, self.points
         slower = float(elementary.power(LAST_RATE / ROAM_RATE, 1 / max(steps, 1)))
         for done in range(1, steps + 1):
@@ -207,13 +152,8 @@ class OutlineFit:
         self._measure.error(self.points)
         self._measure.look()
 
-    def _moved(self, points: Floats, change: Floats) -> tuple[Floats, Flags]:
-        """Return points after a step, and the cubics that it leaves where they were."""
-        moved = self._constraints.project(points + change.reshape(-1, 2))
-        return self._crossings.refuse(points, moved, self._constraints)
-
     def _progress(self, done: int, steps: int, seconds: float) -> Progress:
-        scene = self._scene()
+        scene = self.drawing.scene
         snapshot = Snapshot(lambda: scene, lambda: render(scene))
         figure = decibels(self.error * 255**2)
         return Progress(done, steps, figure, seconds, done / steps, True, len(scene), snapshot)

@@ -20,9 +20,6 @@ from warpsplat.scene.scene import ranges, starts_of
 GAP, BORDER = 4, 16
 """Distances on the sheet between glyphs, and from its sides, where outlines may leave it unseen [px]."""
 
-LEAST_WIDTH = 256
-"""Least width of a sheet [px]."""
-
 Ints = npt.NDArray[np.intp]
 
 
@@ -116,7 +113,7 @@ class Sheet:
 def packed(patches: list[npt.NDArray[np.float64]]) -> tuple[FloatArray, Ints]:
     """Return an image of patches of black in rows on white, and their upper left corners."""
     area = sum((patch.shape[0] + GAP) * (patch.shape[1] + GAP) for patch in patches)
-    width = max(math.isqrt(area), LEAST_WIDTH)
+    width = max(math.isqrt(area), *(patch.shape[1] for patch in patches))
     corners = np.zeros((len(patches), 2), np.intp)
     x, y, height = 0, 0, 0
     for i in sorted(range(len(patches)), key=lambda i: -patches[i].shape[0]):

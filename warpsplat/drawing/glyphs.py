@@ -16,35 +16,27 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.glyph_sheet import Sheet, packed
-from warpsplat.drawing.trace.grids import (
-    NO_REGION,
-    channel_max,
-    dilated,
-    linked_components,
-    nearest_in,
-)
+from warpsplat.drawing.trace.grids import NO_REGION, dilated, linked_components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED
 from warpsplat.drawing.trace.regions import NEGLIGIBLE_NOISE
 from warpsplat.drawing.trace.seeds import noise_of
+from warpsplat.drawing.trace.trace import LEAST_AREA
 from warpsplat.scene import FloatArray
 
 LEAST_GROUND = 400
 """Pixels of exactly one colour that are a ground: more than a letter has inside."""
 
-HIGHEST, WIDEST = 96, 256
-"""Sides of the largest glyph [px]; joined letters are one."""
+HIGHEST = 96
+"""The less side of the largest glyph [px]; joined letters are one."""
 
 NEAR_GROUND = 6 / 255
 """Differences from a ground that are none: scaling leaves rings around letters."""
 
-LEAST_SHOWN = 400.0
-"""Sum of a glyph's differences from its ground [levels], as of two dark pixels on white. Specks are none."""
-
 LEAST_CONTRAST = 24.0
 """Difference of an ink from the ground [levels], below which its shares in pixels are not known."""
 
-SHARING, SAME = 3, 4.0
-"""Different glyphs whose extreme colours are about the same [levels], which is an ink then."""
+SHARING = 3
+"""Different glyphs whose extreme colours are about the same, which is an ink then."""
 
 LIKE_ANOTHER = 0.85
 """Share of a more usual ink in a colour that is none of its own."""
@@ -52,12 +44,8 @@ LIKE_ANOTHER = 0.85
 FEWEST = 16
 """Different or equal glyphs that are worth a sheet."""
 
-MOST = 8000
-"""Different parts of an image that are looked at: one with more has a texture."""
-
-FRINGE, BALANCE, BEND = 0.08, 0.12, 0.4
-"""Shares in red and blue that differ by ``FRINGE`` at least are a fringe if their sums differ by no more than
-``BALANCE`` of green's, and green is off the mean of the two by no more than ``BEND`` of their difference."""
+BALANCE = 0.12
+"""By how much of green's the sums of shares in red and blue may be off it, where they differ by fringes."""
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.intp]
@@ -127,8 +115,6 @@ def _different_glyphs(image: FloatArray) -> list[_Glyph]:
         height, width = own.shape
         patch = np.where(own[..., None], image[y : y + height, x : x + width], ground)
         key = patch.shape, ground.tobytes(), patch.tobytes()
-        if len(known) > MOST:
-            return []
         if key not in known:
             known[key] = _glyph(patch.astype(np.float64) * 255, ground.astype(np.float64) * 255)
         if glyph := known[key]:
@@ -139,7 +125,7 @@ def _different_glyphs(image: FloatArray) -> list[_Glyph]:
 def _islands(image: FloatArray) -> Iterator[tuple[int, int, Bools, FloatArray]]:
     """Yield small parts with one plain ground around them: x, y, their pixels in a box, and its colour.
 
-    There are none if they are few, or the image has noise.
+    There are none if they are few, or a texture, or the image has noise.
     """
     height, width, channels = image.shape
     layers = [np.ascontiguousarray(channel) for channel in np.moveaxis(image, 2, 0)]
@@ -159,10 +145,11 @@ def _islands(image: FloatArray) -> Iterator[tuple[int, int, Bools, FloatArray]]:
     left, top, wide, high, _ = stats.T.astype(np.intp)
     behind = np.where(is_plain, areas.reshape(-1)[nearest], NO_REGION)
     ground = _grounds(np.asarray(labels, np.intp), behind, parts, count)
-    chosen = (ground >= 0) & (wide <= WIDEST) & (high <= HIGHEST)
+    chosen = (ground >= 0) & (np.minimum(wide, high) <= HIGHEST)
     chosen &= (left > 0) & (top > 0) & (left + wide < width) & (top + high < height)
     chosen[0] = False
-    if chosen.sum() < FEWEST or noise_of(image * np.float32(255)) >= NEGLIGIBLE_NOISE:
+    is_texture = LEAST_AREA * chosen.sum() > height * width
+    if chosen.sum() < FEWEST or is_texture or noise_of(image * np.float32(255)) >= NEGLIGIBLE_NOISE:
         return
     pixel = np.zeros(count, np.intp)
     pixel[areas.reshape(-1)] = np.arange(areas.size)  # one of each area
@@ -176,16 +163,13 @@ def _islands(image: FloatArray) -> Iterator[tuple[int, int, Bools, FloatArray]]:
 
 def _grounds(labels: Ints, grounds: Ints, parts: int, count: int) -> Ints:
     """Return the ground around each part, NO_REGION if there are several; shape (part,)."""
-    pairs = []
+    low, high = np.full(parts, count), np.full(parts, NO_REGION)
     for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:, :], np.s_[:-1, :])):
         for one, other in ((a, b), (b, a)):
             met = (labels[one] > 0) & (grounds[other] >= 0)
-            pairs.append(np.unique(labels[one][met].astype(np.int64) * count + grounds[other][met]))
-    part, ground = np.divmod(np.unique(np.concatenate(pairs)), count)
-    found = np.full(parts, NO_REGION, np.intp)
-    found[part] = ground
-    found[np.bincount(part, minlength=parts) != 1] = NO_REGION
-    return found
+            np.minimum.at(low, labels[one][met], grounds[other][met])
+            np.maximum.at(high, labels[one][met], grounds[other][met])
+    return np.where(low == high, low, NO_REGION)
 
 
 def _glyph(patch: Floats, ground: Floats) -> _Glyph | None:
@@ -195,8 +179,6 @@ def _glyph(patch: Floats, ground: Floats) -> _Glyph | None:
     """
     away = patch - ground
     flat = away.reshape(-1, len(ground))
-    if np.abs(flat).max(axis=1).sum() < LEAST_SHOWN:
-        return None
     extreme = np.take_along_axis(flat, np.abs(flat).argmax(axis=0)[None], 0)[0]
     if np.abs(extreme).max() < LEAST_CONTRAST:
         return None
@@ -206,11 +188,10 @@ def _glyph(patch: Floats, ground: Floats) -> _Glyph | None:
     colored = extreme[:3]
     if np.abs(colored).min() < LEAST_CONTRAST or (len(ground) == 4 and extreme[3] != 0):
         return None
-    red, green, blue = np.moveaxis(away[..., :3] / colored, 2, 0)
-    spread, bend = np.abs(red - blue), np.abs(green - (red + blue) / 2)
-    is_fringe = spread.max() >= FRINGE and bend.sum() <= BEND * spread.sum()
-    is_fringe &= abs(red.sum() - blue.sum()) <= BALANCE * green.sum()
-    return _Glyph((red + green + blue) / 3, extreme, ground, []) if is_fringe else None
+    shares = away[..., :3] / colored
+    sums = shares.sum(axis=(0, 1))
+    is_fringe = np.abs(sums - sums[1]).max() <= BALANCE * sums[1]
+    return _Glyph(shares.mean(axis=2), extreme, ground, []) if is_fringe else None
 
 
 def _inks(glyphs: list[_Glyph]) -> dict[bytes, Floats]:
@@ -233,29 +214,21 @@ def _inks(glyphs: list[_Glyph]) -> dict[bytes, Floats]:
 
 
 def _usual_colors(colors: Floats) -> list[Floats]:
-    """Return the inks among extreme colours (color, channel), the most usual first.
+    """Return the inks among extreme colours (color, channel): usual ones, and the strongest of others.
 
-    One that is hardly less than a more usual one is that of thin glyphs; where all are thin, the strongest is
-    the ink.
+    One that is hardly less than a more usual one is that of thin glyphs.
     """
     found: list[Floats] = []
     different, counts = np.unique(np.round(colors), axis=0, return_counts=True)
-    left = np.ones(len(different), np.bool_)
-    near = [channel_max(np.abs(different - color)) <= SAME for color in different]
-    while left.any():
-        sums = np.array([counts[left & each].sum() for each in near]) * left
-        best = int(np.lexsort((-counts, -sums))[0])
-        if sums[best] < SHARING:
-            break
-        left &= ~near[best]
-        color = different[best]
+    near = np.array([(np.abs(different - color) <= MIXED).all(axis=1) for color in different])
+    while (sums := near @ counts).max() >= SHARING:
+        color = different[np.lexsort((-counts, -sums))[0]]
+        counts = np.where((np.abs(different - color) <= MIXED).all(axis=1), 0, counts)
         if not any(_is_share(color, ink, 1) and _share(color, ink) >= LIKE_ANOTHER for ink in found):
             found.append(color)
-    for color in sorted(different[left], key=lambda color: -float(np.abs(color).max())):
+    for color in sorted(different[counts > 0], key=lambda color: -float(np.abs(color).max())):
         if not any(_is_share(color, ink, 1) for ink in found):
-            alike = [_is_share(other, color, 1) for other in different[left]]
-            if counts[left][alike].sum() >= SHARING:
-                found.append(color)
+            found.append(color)
     return found
 
 

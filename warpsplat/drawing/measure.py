@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.drawing.constraints import Drawing, Flags, Floats, Links, rows_of, summed, with_ends
@@ -22,11 +21,11 @@ from warpsplat.rendering.models import EXACT
 from warpsplat.rendering.outline import Outline, OutlineBuffers
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import launch_on_host
-from warpsplat.rendering.renderer import Capacity, Renderer
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.tiles import TILE, from_tiles, read_tiles, to_tiles, write_tiles
-from warpsplat.scene import GRADIENTS, FloatArray, Scene
+from warpsplat.scene import FloatArray
 
-GAUSS = np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)])
+GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
 """Where on a piece of an outline samples lie, with equal weights: exact for cubic functions."""
 
 FARTHEST = 1.5
@@ -59,11 +58,6 @@ class Samples:
     def starts(self, count: int) -> Links:
         """Return where the samples of each of ``count`` cubics begin, and those of the last one end."""
         return np.searchsorted(self.cubic, np.arange(count + 1))
-
-
-def is_shaded(scene: Scene) -> npt.NDArray[np.bool_]:
-    """Return which shapes have gradients, shape (shape,)."""
-    return np.isin(scene.paint, GRADIENTS)
 
 
 def different(numbers: Links) -> Links:
@@ -99,20 +93,13 @@ def pixels_around(cubics: Floats, width: int, height: int) -> tuple[Links, Links
 class Measure:
     """Renders outlines of a drawing over and over and compares them with an image."""
 
-    def __init__(
-        self,
-        target: FloatArray,
-        drawing: Drawing,
-        points: Floats,
-        backend: Backend,
-        capacity: Capacity | None = None,
-    ) -> None:
-        """``points``: where the outlines begin; ``capacity``: of the renderer, if it is known."""
+    def __init__(self, target: FloatArray, drawing: Drawing, points: Floats, backend: Backend) -> None:
+        """``points``: where the outlines begin."""
         self._following = drawing.following()
         self._parameters = Parameters(drawing.scene, backend)
         self._parameters.keeps_colors = True
         viewport = Viewport(target.shape[1], target.shape[0])
-        self._renderer = Renderer(self._parameters, viewport, model=EXACT, capacity=capacity)
+        self._renderer = Renderer(self._parameters, viewport, model=EXACT)
         self._size, self._scale = (viewport.width, viewport.height), 1 / (3 * viewport.pixel_count)
         self.least = LEAST_CONTRAST * self._scale
         """Curvature that does not count."""
@@ -123,19 +110,6 @@ class Measure:
         y, x = np.divmod(pixel, viewport.width)
         self._pixel = ((y // TILE * viewport.tiles_x + x // TILE) * TILE + x % TILE) * TILE + y % TILE
         self._render(points)
-
-    @property
-    def capacity(self) -> Capacity:
-        """Capacity of the renderer's arrays."""
-        return self._renderer.capacity
-
-    def paint(self, frames: Floats) -> None:
-        """Place the gradients of shapes."""
-        self._parameters.groups["frames"].value.assign(frames.astype(np.float32))
-
-    def frames_gradient(self) -> Floats:
-        """Return the derivative of the last ``gradient``'s error by the frames, shape (shape, 6)."""
-        return self._parameters.groups["frames"].grad.numpy().astype(np.float64)
 
     def _render(self, points: Floats) -> None:
         self._parameters.groups["points"].value.assign(points.astype(np.float32))
@@ -167,7 +141,7 @@ class Measure:
 
     def look(self) -> None:
         """Measure the contrasts across the outlines as they are now."""
-        cubic, _, vertex, following = self._pieces()
+        cubic, vertex, following = self._pieces()
         normal, length = self._across(vertex, following)
         square = np.zeros(len(vertex))
         for channel in self._channels():
@@ -177,18 +151,13 @@ class Measure:
         self._contrast = np.where(seen, np.maximum(square, FAINT), HIDDEN) * self._scale
         self._counts = np.bincount(cubic, minlength=len(self._following))
 
-    def samples(self, points: Floats, counts: Links | None = None) -> Samples:
-        """Return samples of the outlines at ``points``, on themselves.
-
-        ``counts``: pieces of the cubics, two samples on each; without, as they were looked at.
-        """
-        counts = self._counts if counts is None else counts
+    def samples(self, points: Floats) -> Samples:
+        """Return samples of the outlines at ``points``, on themselves: two a piece, as last looked at."""
+        counts = self._counts
         cubic = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(cubic)) - (np.cumsum(counts) - counts)[cubic]
         t = ((number[:, None] + GAUSS) / counts[cubic][:, None]).ravel()
-        known = (2 * number + 1) * self._counts[cubic] // (2 * counts[cubic])
-        contrast = self._contrast[(np.cumsum(self._counts) - self._counts)[cubic] + known]
-        weight = np.repeat(contrast * 0.5 / counts[cubic], 2)
+        weight = np.repeat(self._contrast * 0.5 / counts[cubic], 2)
         cubics, cubic = with_ends(points, self._following), np.repeat(cubic, 2)
         where, across = np.zeros((2, len(cubic), 2))
         found = Samples(cubic, t, where, across, weight)
@@ -198,11 +167,12 @@ class Measure:
 
     def places(self, points: Floats) -> Samples:
         """Return samples at ``points``, those of the last ``error``, where the image has outlines."""
+        self.look()
         self._back(self._by_image(self._residual))
-        cubic, _, vertex, following = self._pieces()
+        _, vertex, following = self._pieces()
         normal, _ = self._across(vertex, following)
         slope = (self._piece_grads(vertex) * normal[:, None]).sum(axis=2)
-        found = self.samples(points, np.bincount(cubic, minlength=len(self._following)))
+        found = self.samples(points)
         # A distance that is linear along the piece has these ends, and these values at the samples.
         weight = np.maximum(found.weight.reshape(-1, 2).sum(axis=1), 1e-30)
         ends = -np.stack([2 * slope[:, 0] - slope[:, 1], 2 * slope[:, 1] - slope[:, 0]], axis=1)
@@ -223,8 +193,8 @@ class Measure:
         assert isinstance(geometry, Outline)
         return geometry.buffers
 
-    def _pieces(self) -> tuple[Links, Links, Links, Links]:
-        """Return cubic, number in it, first and second vertex of the straight pieces."""
+    def _pieces(self) -> tuple[Links, Links, Links]:
+        """Return the cubic, and the first and second vertex, of the straight pieces."""
         b, arrays = self._outline, self._parameters.arrays
         counts = b.bezier_pieces.numpy().astype(np.intp)
         shape = arrays["contour_shape"].numpy()[arrays["bezier_contour"].numpy()]
@@ -232,7 +202,7 @@ class Measure:
         cubic = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(cubic)) - np.repeat(np.cumsum(counts) - counts, counts)
         vertex = base[cubic] + number
-        return cubic, number, vertex, b.vertex_next.numpy()[vertex]
+        return cubic, vertex, b.vertex_next.numpy()[vertex]
 
     def _piece_grads(self, vertex: Links) -> Floats:
         """Return the gradients of the two ends of the pieces that begin at vertices, shape (piece, 2, 2)."""

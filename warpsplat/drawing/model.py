@@ -88,14 +88,14 @@ def carried(samples: Samples, drawing: Drawing, edits: Edits, keep: Flags) -> Sa
 
 
 def fitted(
-    samples: Samples, drawing: Drawing, least: float, chosen: Flags
+    samples: Samples, drawing: Drawing, least: float, contours: Links
 ) -> tuple[Drawing, Samples, Floats]:
-    """Fit the ``chosen`` contours to ``samples``; return all, their samples, and the errors by cubic."""
-    inside = chosen[drawing.contour()]
+    """Fit ``contours`` to ``samples``; return the whole drawing, its samples, and the errors by cubic."""
+    inside = np.isin(drawing.contour(), contours)
     own = inside[samples.cubic]
     part = samples.take(own)
     part = replace(part, cubic=(np.cumsum(inside) - 1)[part.cubic])
-    made, part = _fitted(part, drawing.contours(chosen), least)
+    made, part = _fitted(part, drawing.contours(np.unique(contours)), least)
     points, t = drawing.scene.points.copy(), samples.t.copy()
     points[np.repeat(inside, 3)], t[own] = made, part.t
     samples, fit = replace(samples, t=t), replace(drawing, scene=replace(drawing.scene, points=points))

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.denoise import without_noise
+from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
@@ -36,9 +37,10 @@ class Picture:
     """Where the upper left corner lies in the image before it was enlarged, x and y [px]."""
     original_size: npt.NDArray[np.intp]
     """Width and height of the image before it was enlarged [px]."""
-
     drawn_size: npt.NDArray[np.intp]
     """Width and height of what is drawn [px]."""
+    is_thin: bool
+    """Whether the image has few rows or columns, which are repeated beyond its borders."""
 
     seen: FloatArray | None = None
     """The pixels before they were made sharp, if they were."""
@@ -48,17 +50,14 @@ class Picture:
         """Return the picture of an image."""
         factor = _enlargement(image)
         pixels, noise = without_noise(np.ascontiguousarray(image[::factor, ::factor]))
-        size = np.array(pixels.shape[1::-1])
+        size, thin = np.array(pixels.shape[1::-1]), np.array(margins(pixels, THIN_SIDE))
         box = _drawn_box(pixels)
-        if box is None:
-            return cls(pixels, noise, factor, np.zeros(2, np.intp), size, size)
-        first, last = box
-        low, high = np.maximum(first - MARGIN, 0), np.minimum(last + MARGIN, size)
-        inner = pixels[low[1] : high[1], low[0] : high[0]]
-        before, after = low - (first - MARGIN), last + MARGIN - high
-        widths = [(int(before[axis]), int(after[axis])) for axis in (1, 0)]
-        wide = np.pad(inner, [*widths, (0, 0)], mode="edge")
-        return cls(np.ascontiguousarray(wide), noise, factor, first - MARGIN, size, last - first)
+        first, last = (-thin, size + thin) if box is None else (box[0] - MARGIN, box[1] + MARGIN)
+        low, high = np.maximum(first, 0), np.minimum(last, size)
+        widths = [((low - first)[axis], (last - high)[axis]) for axis in (1, 0)]
+        wide = np.pad(pixels[low[1] : high[1], low[0] : high[0]], [*widths, (0, 0)], mode="edge")
+        drawn = size if box is None else box[1] - box[0]
+        return cls(np.ascontiguousarray(wide), noise, factor, first, size, drawn, bool(thin.any()))
 
     @property
     def share(self) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpsplat.drawing import prices
-from warpsplat.drawing.changes import MOST_OFF, Change, contour_change
+from warpsplat.drawing.changes import MOST_OFF, Alternative, contour_change
 from warpsplat.drawing.constraints import SAME_COORDINATE, Drawing, Floats, summed
 from warpsplat.drawing.measure import Samples
 from warpsplat.drawing.trace.contours import joints_of
@@ -23,9 +23,6 @@ from warpsplat.svg.primitives import Primitive
 
 SAMPLES = 96
 """Places by which an outline is compared with a shape."""
-
-LEAST_NEAR = 0.6
-"""Least share of an outline that is near its basic shape: what other shapes hide may be anywhere."""
 
 ROUNDS = 8  # of Gauss and Newton's method
 SMALL = 1e-4
@@ -77,7 +74,7 @@ FAMILIES = Family(2, _box), Family(1, _ellipse), Family(2, _ellipse), Family(3, 
 
 def shape_changes(
     drawing: Drawing, samples: Samples, worth: float, over: Callable[[], bool] = bool
-) -> list[Change]:
+) -> list[Alternative]:
     """Return the basic shape of each contour that is near to one, the cheapest by error and bytes.
 
     Args:
@@ -94,26 +91,22 @@ def shape_changes(
     chosen = first + np.floor((np.arange(SAMPLES) + 0.5) / SAMPLES * count).astype(np.intp)
     places, weights = samples.place[chosen], samples.weight[chosen] * count / SAMPLES
     areas, sizes = areas_of(places).astype(np.float64), _sizes(drawing)[contours]
-    found: dict[int, Change] = {}
+    found: dict[int, Alternative] = {}
     least = np.full(len(contours), np.inf)
     for family in FAMILIES:
-        # Families come by size: a shape that costs less than the size of the next one alone is the best.
-        rows = np.flatnonzero(least >= worth * family.bytes)
-        if not len(rows) or over():
+        if over():
             break
-        values, off = nearest(family, places[rows], weights[rows])
-        near = off <= MOST_OFF
-        costs = (weights[rows] * np.minimum(off, MOST_OFF) ** 2).sum(axis=1) + worth * family.bytes
-        costs[near.mean(axis=1) < LEAST_NEAR] = np.inf
-        for k in np.flatnonzero(costs < least[rows]).tolist():
-            i = int(rows[k])
-            made = family.shape(values[k], is_clockwise=bool(areas[i] > 0))
+        values, off = nearest(family, places, weights)
+        costs = (weights * np.minimum(off, MOST_OFF) ** 2).sum(axis=1) + worth * family.bytes
+        costs[np.median(off, axis=1) > MOST_OFF] = np.inf  # what other shapes hide may be anywhere
+        for i in np.flatnonzero(costs < least).tolist():
+            made = family.shape(values[i], is_clockwise=bool(areas[i] > 0))
             found[i] = _change(drawing, int(contours[i]), made, float(sizes[i]) - family.bytes)
-        least[rows] = np.minimum(least[rows], costs)
+        least = np.minimum(least, costs)
     return [found[i] for i in sorted(found)]
 
 
-def _change(drawing: Drawing, contour: int, made: Primitive, saved: float) -> Change:
+def _change(drawing: Drawing, contour: int, made: Primitive, saved: float) -> Alternative:
     """Return the change of a contour to a basic shape."""
     cubics = made.cubics()
     level = np.abs(cubics[:, 3] - cubics[:, 0]) < SAME_COORDINATE

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.fit.problem import Fit
 from warpsplat.scene import FloatArray, Scene
 
 THIN_SIDE = 16
@@ -16,7 +14,7 @@ THIN_SIDE = 16
 BEYOND = 4
 """How far a thin image is continued [px]: regions and lines are distinguished within less."""
 
-TRACED_PSNR = 30.0
+TRACED_PSNR = 25.0
 """PSNR from which on a thin image counts as traced [dB]; below, regions were missed."""
 
 
@@ -38,13 +36,3 @@ def cut(scene: Scene, across: int, down: int) -> Scene:
     canvas = replace(scene.canvas, width=width, height=height)
     frames = np.concatenate([scene.frames[:, :2] - shift, scene.frames[:, 2:]], axis=1)
     return replace(scene, canvas=canvas, points=scene.points - shift, frames=frames)
-
-
-def best_of_thin(first: Fit, others: Sequence[Callable[[], Fit]]) -> Fit:
-    """Return the first of some drawings that shows the image; the best of all if none does."""
-    best = first
-    for draw in others:
-        if best.render_psnr >= TRACED_PSNR:
-            break
-        best = max(best, draw(), key=lambda made: made.render_psnr)
-    return best

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpsplat.drawing import model
 from warpsplat.drawing.changes import changed, worthwhile
-from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished, Flags, Links
+from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
@@ -86,7 +86,7 @@ def finish_drawing(
     _roam(fit, target, run, FIRST_ROAM, negligible)
     fit, target = _through_optics(fit, target, parts[0], seen)
     if tidy and not run.over():
-        fit = OutlineFit(target, tidied(fit, byte, run.over), run, fit.capacity)
+        fit = OutlineFit(target, tidied(fit, byte, run.over), run)
         fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
         fit, target = _through_optics(fit, target, parts[1], seen)
@@ -99,7 +99,7 @@ def finish_drawing(
         if symbols:
             exact, equal = with_equal_outlines(target, exact, run, worth_of_byte)
         if shapes or equal:
-            fit = OutlineFit(target, exact, run, fit.capacity)
+            fit = OutlineFit(target, exact, run)
     psnr = decibels(fit.error * 255**2) if seen is None else math.nan
     if run.over():
         return Finished(fit.drawing, grid or min(DRAFT_GRID, finest), psnr)
@@ -127,7 +127,7 @@ def _through_optics(
         target = find_optics(
             render(drawing.scene, backend=run.backend), matching(seen, drawing.scene.canvas)
         ).undone
-        fit = OutlineFit(target, drawing, run, fit.capacity)
+        fit = OutlineFit(target, drawing, run)
         fit.advance(run, SECOND_STEPS)
     return fit, target
 
@@ -161,15 +161,15 @@ def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = b
         cheap = growth <= RECOVERED * edits.saved * byte
         edits, growth = edits.take(cheap), growth[cheap]
         left = edits.take(apart(edits, growth / edits.saved))
-        contour, count = drawing.contour(), len(drawing.scene.starts) - 1
+        contour = drawing.contour()
         # Outlines without candidates, or whose candidates are all refused, stay as they are.
-        refused[~touched(contour[left.at], count)[contour]] = True
+        refused[~np.isin(contour, contour[left.at])] = True
         while len(left.at):
             if over():
                 return drawing
             edited, keep = applied(drawing, left)
             moved = model.carried(samples, drawing, left, keep)
-            edited, moved, after = model.fitted(moved, edited, least, touched(contour[left.at], count))
+            edited, moved, after = model.fitted(moved, edited, least, contour[left.at])
             every = np.zeros(len(keep))
             every[keep] = after
             change = every - errors
@@ -188,11 +188,6 @@ def tidied(fit: OutlineFit, byte_of: Worth = worth, over: Callable[[], bool] = b
         if not len(left.at):
             break
     return drawing
-
-
-def touched(contours: Links, count: int) -> Flags:
-    """Return which of ``count`` contours are among ``contours``."""
-    return np.bincount(contours, minlength=count) > 0
 
 
 def drawing_grid(fit: OutlineFit, finest: float, byte_of: Worth) -> float:
