@@ -13,8 +13,7 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured
-CUBIC_COST = 1.4  # what a cubic counts over a line, about its bytes
-ERROR_COST = 0.35  # what an error of the size of the tolerance counts for each piece
+CUBIC_COST = 1.4  # what a cubic counts, where a line and an error of the size of the tolerance count 1
 MOST_KNOTS = 48  # between which all curves are tried
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
 
@@ -134,7 +133,7 @@ def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) 
 
 
 def _costs(errors: Floats, base: float, tolerance: Floats) -> Floats:
-    return np.where(errors <= tolerance, base + ERROR_COST * (errors / tolerance) ** 2, np.inf)
+    return np.where(errors <= tolerance, base + (errors / tolerance) ** 2, np.inf)
 
 
 def _line_errors(x: Floats, y: Floats) -> Floats:

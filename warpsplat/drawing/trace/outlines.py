@@ -10,7 +10,7 @@ from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats
 from warpsplat.drawing.trace.partition import Partition
 from warpsplat.drawing.trace.planar import INSIDE, LEFT, OUTSIDE, RIGHT, STEPS, Loops
 
-TREND = 4  # cracks ahead and behind that tell the direction of an outline
+TREND = 3  # cracks ahead and behind that tell the direction of an outline
 
 
 @dataclass(frozen=True)
