@@ -94,10 +94,10 @@ def test_a_margin_changes_nothing(name: str, quality: str) -> None:
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
 def test_noise_of_a_level_costs_little(name: str, quality: str) -> None:
-    """Up to 9 dB before flat colours were freed of it; the logo, of 52 dB, loses 2 to 3.6 for six seeds."""
+    """Up to 9 dB before flat colours were freed of it; 2 of a logo that has 52."""
     image = image_of(name)
     losses = [psnr(drawn(each, quality) / 255, image) for each in (image, with_noise(image, 1))]
-    assert losses[1] > losses[0] - 4
+    assert losses[1] > losses[0] - 3
 
 
 @pytest.mark.parametrize("levels", [1, 2, 4])

@@ -12,9 +12,12 @@ import pytest
 import warpsplat
 from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
 from warpsplat.drawing.draft import draw_pixels
+from warpsplat.drawing.draw import draw_regions
 from warpsplat.drawing.trace.subject import Guess
+from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.settings import make_settings
+from warpsplat.metrics import psnr_of_file
 from warpsplat.run import prepare
 from warpsplat.run.second_look import other_subject
 from warpsplat.scene import FloatArray
@@ -74,3 +77,15 @@ def test_photographs_get_no_second_look() -> None:
     image = photograph(48)
     made = Fit(prepare.starting_scene(image, 4), 4.0, 10.0, 10.0, 1, interrupted=False)
     assert other_subject(made, problem(image, subject="photo")) is None
+
+
+def test_a_sharp_drawing_of_a_blurred_picture_is_kept() -> None:
+    """It shows less of it than a thumbnail would, but all of it through the blur."""
+    lines = np.ones((96, 96), np.float32)
+    for start, end in np.random.default_rng(1).integers(6, 90, (12, 2, 2)).tolist():
+        cv2.line(lines, start, end, 0, 4, cv2.LINE_AA)
+    blurred = np.repeat(cv2.GaussianBlur(lines, (0, 0), 1.2)[..., None], 3, axis=2).astype(np.float32)
+    posed = problem(blurred, subject="drawing")
+    made = draw_regions(posed, Run(None))
+    assert psnr_of_file(finished(made.scene, posed.settings, made.per_pixel), blurred) < 20
+    assert other_subject(made, posed) is None

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.fit.export import finished
+from warpsplat.drawing.optics import find_optics
+from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.problem import Fit, Problem
 from warpsplat.fit.settings import SUBJECTS, Subject, make_settings
 from warpsplat.metrics import psnr_of_file
@@ -41,8 +42,12 @@ def other_subject(made: Fit, problem: Problem) -> Subject | None:
     scale = math.sqrt(len(text.encode()) / (BYTES_PER_PIXEL * height * width))
     if scale >= 1:
         return None
-    size = max(1, int(scale * width)), max(1, int(scale * height))
-    return other if psnr_of_file(text, target) + MUCH < _thumbnail_psnr(target, size) else None
+    enough = _thumbnail_psnr(target, (max(1, int(scale * width)), max(1, int(scale * height)))) - MUCH
+    if psnr_of_file(text, target) >= enough:
+        return None
+    # A drawing is sharp where the image may not be.
+    shown = shown_image(text, made.scene, target.shape[2])
+    return other if _psnr(find_optics(shown, target).optics(shown), target) < enough else None
 
 
 def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
@@ -54,7 +59,10 @@ def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
 
 
 def _thumbnail_psnr(target: FloatArray, size: tuple[int, int]) -> float:
-    """Return the PSNR of an image made smaller and enlarged again; of one with opacity, as on black."""
-    small = resize_area(target, size)
-    error = float(np.square(resize_linear(small, target.shape[1::-1]) - target)[..., :3].mean())
-    return -10 * float(log10(max(error, 1e-10)))
+    """Return the PSNR of an image made smaller and enlarged again."""
+    return _psnr(resize_linear(resize_area(target, size), target.shape[1::-1]), target)
+
+
+def _psnr(shown: FloatArray, target: FloatArray) -> float:
+    """Return the PSNR of an image; of one with opacity, as on black."""
+    return -10 * float(log10(max(float(np.square(shown - target)[..., :3].mean()), 1e-10)))
