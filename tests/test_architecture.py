@@ -36,7 +36,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "ssimulacra2": (),
     "rendering": CORE,
     "fit": ("alpha", "metrics", "rendering", "svg", *CORE),
-    "drawing.trace": ("alpha", "errors", "portable", "scene", "drawing.prices"),
+    "drawing.trace": ("alpha", "errors", "portable", "scene", "drawing.prices", "svg.primitives"),
     "drawing.strokes": ("errors", "portable", "scene", "drawing.trace"),
     "drawing": ("alpha", "fit", "metrics", "rendering", "svg", *CORE),
     "search": ("alpha", "fit", "metrics", "rendering", "svg", *CORE),
