@@ -143,7 +143,7 @@ def _traced(
 
 
 def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, _Trace]:
-    """Return a picture as it was before it was blurred or sharpened, and its trace."""
+    """Return a picture as it was before it was blurred or sharpened, if that may be undone, and its trace."""
 
     def trace(pixels: FloatArray) -> _Trace:
         return _traced(replace(picture, pixels=pixels), settings, run, most, byte_price(settings))
@@ -152,6 +152,8 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
         text = finished(found.scene, settings, DRAFT_GRID)
         return shown_image(text, found.scene, picture.pixels.shape[2])
 
+    if settings.optics == "none":
+        return picture, trace(picture.pixels)
     pixels, found = without_optics(picture.pixels, trace, show, run.over)
     seen = None if pixels is picture.pixels else picture.pixels
     return replace(picture, pixels=pixels, seen=seen), found

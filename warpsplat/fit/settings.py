@@ -35,6 +35,7 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
+OpticsChoice = Literal["auto", "none"]
 LossName = Literal["l2", "ssim", "edges"]
 
 SUBJECTS = {
@@ -297,6 +298,11 @@ class Settings:
         parse=parse_bytes,
     )
     detail: float = option(0.5, "Of drawings: from 0, few big shapes, to 1, every speck.", FRACTION, **DRAWN)
+    optics: OpticsChoice = option(
+        "auto",
+        "Whether a drawing is made sharp where a scan, an enlargement or a filter blurred the image.",
+        **DRAWN,
+    )
     seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
     background: str = option(
         "auto",

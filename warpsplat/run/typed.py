@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import LossName, Painting, Quality, Subject
+from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -46,6 +46,7 @@ class Options(RefineOptions, total=False):
     max_bytes: int | str | None
     max_memory: int | str | None
     detail: float | None
+    optics: OpticsChoice | None
     seed: int | None
     size: str | None
     page: str | None
