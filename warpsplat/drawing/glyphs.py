@@ -221,7 +221,7 @@ def _usual_colors(colors: Floats) -> list[Floats]:
     found: list[Floats] = []
     different, counts = np.unique(np.round(colors), axis=0, return_counts=True)
     near = np.array([(np.abs(different - color) <= MIXED).all(axis=1) for color in different])
-    while (sums := near @ counts).max() >= SHARING:
+    while (sums := np.where(near, counts, 0).sum(axis=1)).max() >= SHARING:
         color = different[np.lexsort((-counts, -sums))[0]]
         counts = np.where((np.abs(different - color) <= MIXED).all(axis=1), 0, counts)
         if not any(_is_share(color, ink, 1) and _share(color, ink) >= LIKE_ANOTHER for ink in found):
