@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import replace
 
@@ -18,7 +17,7 @@ from warpsplat.drawing.strokes.pens import grouped
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.drawing.thin import THIN_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
-from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated
+from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated, nearest_in
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
@@ -207,19 +206,17 @@ def filled(traced: TracedLines, run: Run, finest: float, *, tidy: bool = True) -
 
     ``finest``: most view box units per pixel.
     """
-    assert traced.areas is not None
-    scenes, grids, pens = [], [], np.unique(traced.area_pens).tolist()
-    for number, pen in enumerate(pens):
-        own = np.append(False, traced.area_pens == pen)[traced.areas.labels]
-        ink = np.zeros((*own.shape, 4), np.float32)
-        # A pixel beside an area may be covered by its edge.
-        ink[..., 3] = np.where(dilated(own, 3), traced.areas.cover, 0)
-        found = trace(ink)
-        part = run.part(number / len(pens), (number + 1) / len(pens))
-        done = finish_drawing(ink, Drawing(found.scene, found.joints), part, finest=finest, tidy=tidy)
-        shapes, count = done.drawing.scene, len(done.drawing.scene)
-        colors = np.repeat(traced.pens[pen][None], count, axis=0)
-        layer, opacities = np.full(count, pen, np.int32), np.ones(count, np.float32)
-        scenes.append(replace(shapes, layer=layer, colors=colors, opacities=opacities))
-        grids.append(done.per_pixel)
-    return functools.reduce(Scene.append, scenes), max(grids)
+    areas = traced.areas
+    assert areas is not None
+    inside = areas.labels > 0
+    pen = traced.area_pens[areas.labels.reshape(-1)[nearest_in(inside)] - 1]
+    # A pixel beside an area may be covered by its edge.
+    cover = np.where(dilated(inside, 3), areas.cover, 0)[..., None]
+    ink = np.concatenate([traced.pens[pen] * cover, cover], axis=2).astype(np.float32)
+    found = trace(ink, gradients=())
+    done = finish_drawing(ink, Drawing(found.scene, found.joints), run, finest=finest, tidy=tidy)
+    shapes = done.drawing.scene
+    layer = np.linalg.norm(shapes.colors[:, None] - traced.pens, axis=2).argmin(axis=1).astype(np.int32)
+    opacities = np.ones(len(shapes), np.float32)
+    shapes = replace(shapes, layer=layer, colors=traced.pens[layer], opacities=opacities)
+    return shapes, done.per_pixel
