@@ -65,16 +65,8 @@ class Drawing:
 
     def contours(self, chosen: Links) -> Drawing:
         """Return contours as one shape."""
-        counts = np.diff(self.scene.starts)[chosen]
-        points = ranges(self.scene.starts[:-1][chosen], counts)
-        scene = replace(
-            self.scene.take(np.array([0])),
-            points=self.scene.points[points],
-            starts=starts_of(counts),
-            closed=self.scene.closed[chosen],
-            first=np.array([0, len(points)], self.scene.first.dtype),
-        )
-        return Drawing(scene, self.joints[points])
+        points = ranges(self.scene.starts[:-1][chosen], np.diff(self.scene.starts)[chosen])
+        return Drawing(of_contours(self.scene, chosen), self.joints[points])
 
     def contour(self) -> Links:
         """Return the contour of each cubic, shape (cubic,)."""
@@ -115,6 +107,15 @@ class Finished(NamedTuple):
     """View box units per pixel."""
     psnr: float = math.nan
     """PSNR of the exact render before it is rounded [dB]; NaN if it was not fitted."""
+
+
+def of_contours(scene: Scene, chosen: Links) -> Scene:
+    """Return contours as one shape, painted as the first of ``scene``."""
+    counts = np.diff(scene.starts)[chosen]
+    points = scene.points[ranges(scene.starts[:-1][chosen], counts)]
+    first, starts = np.array([0, len(points)], scene.first.dtype), starts_of(counts)
+    one = scene.take(np.array([0]))
+    return replace(one, points=points, first=first, starts=starts, closed=scene.closed[chosen])
 
 
 def with_ends(points: Floats, following: Links) -> Floats:

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight
+from warpsplat.drawing.constraints import of_contours
 from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.trace import Traced, trace_partition
 from warpsplat.scene import FloatArray, Scene
-from warpsplat.scene.scene import ranges, starts_of
+from warpsplat.scene.scene import ranges
 
 GAP, BORDER = 4, 16
 """Distances on the sheet between glyphs, and from its sides, where outlines may leave it unseen [px]."""
@@ -83,20 +84,17 @@ class Sheet:
         """Return contours of the sheet in the places of copies, as one shape."""
         counts = np.diff(drawn.starts)[contours]
         glyphs = self.copies[copies]
-        moved = drawn.points[ranges(drawn.starts[contours], counts)]
-        moved = moved + np.repeat(self.places[copies] - self.corners[glyphs], counts, axis=0)
+        made = of_contours(drawn, contours)
+        moved = made.points + np.repeat(self.places[copies] - self.corners[glyphs], counts, axis=0)
         # What leaves the sheet, where nobody sees it, would be seen in the image. Handles reach farther.
         places, sizes = (
             np.repeat(each, counts, axis=0) for each in (self.places[copies], self.sizes[glyphs])
         )
         beyond = np.where((np.arange(len(moved)) % 3 > 0)[:, None], sizes, GAP)
         return replace(
-            drawn.take(np.array([0])),
+            made,
             canvas=rest.canvas,
             points=np.clip(moved, places - beyond, places + sizes + beyond).astype(np.float32),
-            starts=starts_of(counts),
-            closed=drawn.closed[contours],
-            first=np.array([0, counts.sum()], np.int32),
             colors=straight(color[None]),
             opacities=color[3:].astype(np.float32),
         )

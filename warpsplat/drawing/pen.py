@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from warpsplat.drawing.constraints import of_contours
 from warpsplat.drawing.line_art import STROKE_STEPS, refined
 from warpsplat.drawing.picture import MARGIN
 from warpsplat.drawing.prices import CUBIC, LINE, MOVE
@@ -20,7 +21,6 @@ from warpsplat.portable import filters
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, IndexArray, Kind, Paint, Scene
-from warpsplat.scene.scene import starts_of
 from warpsplat.svg.data import cubic_rows
 from warpsplat.svg.sizes import PATH
 
@@ -139,10 +139,5 @@ def _size(scene: Scene) -> float:
 
 def _having(shape: Scene, chosen: Bools) -> Scene:
     """Return a shape with the ``chosen`` contours; none if there are none."""
-    counts = np.diff(shape.starts)
-    points = shape.points[np.repeat(chosen, counts)]
-    if not len(points):
-        return shape.take(np.zeros(0, np.intp))
-    first = np.array([0, len(points)], shape.first.dtype)
-    starts = starts_of(counts[chosen])
-    return replace(shape, points=points, first=first, starts=starts, closed=shape.closed[chosen])
+    contours = np.flatnonzero(chosen)
+    return of_contours(shape, contours) if len(contours) else shape.take(contours)
