@@ -72,7 +72,9 @@ def _round(
     labels, fills = parts.labels.copy(), parts.fills.copy()
     paint, colorings = parts.paint.tolist(), list(parts.colorings)
     for some in _components_by_size(unexplained):
-        thin = some[np.argsort(-residual[some], kind="stable")]  # the least mixed first
+        # The least mixed first; what has no region near it may be anything.
+        evidence = np.where(np.isfinite(residual[some]), residual[some], 0)
+        thin = some[np.argsort(-evidence, kind="stable")]
         near = _near(labels, parts.paint, rows[thin], columns[thin])
         chosen = _matching_color(shown[thin], bases[thin], colorings, near, limit)
         if chosen is None or (chosen == len(colorings) and not new_colors):
