@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
 from warpsplat.drawing.trace.mixtures import MIXED, mixed, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts
 from warpsplat.scene.scene import numbers_in
@@ -69,12 +69,15 @@ def _round(
     )
     shown, unexplained, other = image[rows, columns], np.zeros_like(waiting), np.zeros_like(waiting)
     unexplained[rows, columns] = True
+    # What has no region near it may be the core of a line, or a tint beside one.
+    known = parts.labels[parts.labels != NO_REGION]
+    if len(known):
+        main = parts.colorings[parts.paint[np.bincount(known).argmax()]].color
+        residual = np.where(np.isfinite(residual), residual, channel_max(np.abs(shown - main)))
     labels, fills = parts.labels.copy(), parts.fills.copy()
     paint, colorings = parts.paint.tolist(), list(parts.colorings)
     for some in _components_by_size(unexplained):
-        # The least mixed first; what has no region near it may be anything.
-        evidence = np.where(np.isfinite(residual[some]), residual[some], 0)
-        thin = some[np.argsort(-evidence, kind="stable")]
+        thin = some[np.argsort(-residual[some], kind="stable")]  # the least mixed first
         near = _near(labels, parts.paint, rows[thin], columns[thin])
         chosen = _matching_color(shown[thin], bases[thin], colorings, near, limit)
         if chosen is None or (chosen == len(colorings) and not new_colors):
