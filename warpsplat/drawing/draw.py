@@ -45,7 +45,7 @@ class _Trace:
     """A traced picture: its glyphs, and the rest of it."""
 
     drawing: Drawing
-    """Of the rest."""
+    """The trace of the rest."""
     rest: FloatArray
     """The picture without glyphs."""
     scene: Scene

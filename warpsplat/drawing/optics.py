@@ -20,7 +20,7 @@ from warpsplat.portable.linear import solve
 from warpsplat.scene import FloatArray
 
 RADIUS = 2
-"""Of the kernel [px]."""
+"""Radius of the kernel [px]."""
 
 TURNS = 6
 """Traces from which it is found, at the most."""
@@ -57,7 +57,7 @@ class Optics:
         return total
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """The optics that bring a sharp image nearest to a picture."""
 
@@ -66,25 +66,29 @@ class Found:
     """Sum of squared errors with them, in whole levels of lightness."""
     without: float
     """The same without."""
-    undone: FloatArray
-    """The picture without them."""
+    sharp: Floats
+    """The sharp image, in whole levels."""
+    seen: Floats
+    """The picture, likewise."""
+
+    def undone(self) -> FloatArray:
+        """Return the picture without the optics, sRGB in [0, 1]."""
+        levels = np.clip(np.round(self.seen - self.optics(self.sharp) + self.sharp), 0, 255)
+        if levels.shape[2] == 4:
+            levels = np.minimum(levels, levels[..., 3:])
+        return np.asarray(levels / np.float32(255), np.float32)
 
 
 def find_optics(sharp: FloatArray, seen: FloatArray) -> Found:
-    """Return the optics that bring a sharp image nearest to a picture, and the picture without them.
+    """Return the optics that bring a sharp image nearest to a picture.
 
     Args:
         sharp: sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity, (height, width, 4).
         seen: Likewise; only the lightness of both counts.
     """
     sharp, seen = _levels(sharp), _levels(seen)
-    optics, error, without = _nearest(
-        *((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
-    )
-    undone = np.clip(np.round(seen - optics(sharp) + sharp), 0, 255)
-    if undone.shape[2] == 4:
-        undone = np.minimum(undone, undone[..., 3:])
-    return Found(optics, error, without, np.asarray(undone / np.float32(255), np.float32))
+    light = ((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
+    return Found(*_nearest(*light), sharp, seen)
 
 
 def _nearest(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
@@ -139,7 +143,7 @@ def without_optics(
             bound, best = found.error, (current, traced)
         if over():
             break
-        current = found.undone
+        current = found.undone()
         traced = trace(current)
     return best
 

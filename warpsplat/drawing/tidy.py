@@ -126,7 +126,7 @@ def _through_optics(
         assert seen is not None
         target = find_optics(
             render(drawing.scene, backend=run.backend), matching(seen, drawing.scene.canvas)
-        ).undone
+        ).undone()
         fit = OutlineFit(target, drawing, run)
         fit.advance(run, SECOND_STEPS)
     return fit, target
