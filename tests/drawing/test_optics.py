@@ -1,107 +1,165 @@
-"""What blurred or sharpened a picture is found and undone."""
+"""How a picture was made is found and undone."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from PIL import Image, ImageFilter
 
 import warpsplat
 from tests.drawing.trace.drawings import draw
 from warpsplat import metrics
-from warpsplat.drawing.optics import RINGS, Optics, find_optics, without_optics
-from warpsplat.scene import FloatArray
+from warpsplat.drawing.constraints import DRAFT_GRID
+from warpsplat.drawing.edges import LINEAR, MIDDLES
+from warpsplat.drawing.optics import COUNTS, NONE, RADIUS, RINGS, SCALE, Seen
+from warpsplat.drawing.trace.trace import Traced, trace
+from warpsplat.drawing.without_optics import without_optics
+from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.settings import make_settings
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 
+SIDE, BIG = 96, 8
+
 BODY = (
-    '<rect width="96" height="96" fill="#fff"/><path d="M12 80L44 14L82 78z" fill="#c8102e"/>'
-    '<circle cx="60" cy="30" r="17" fill="#003da5"/><path d="M20 20L70 86" stroke="#222" stroke-width="4"/>'
+    '<rect width="96" height="96" fill="#f4f1de"/><path d="M12 80L44 14L82 78z" fill="#b0344d"/>'
+    '<circle cx="60" cy="30" r="17" fill="#3d5a80"/><path d="M20 20L70 86" stroke="#222" stroke-width="4"/>'
 )
+"""Colours from which rings go beyond."""
 
-GAUSS = Optics((0.38, 0.11, 0.035, 0.005, 0.003, -0.001))
+
+def enlarged(times: int) -> Image.Image:
+    image = draw(f'<g transform="scale({times})">{BODY}</g>', times * SIDE, times * SIDE, hard=times == BIG)
+    return Image.fromarray(np.round(255 * image).astype(np.uint8))
 
 
-def levels(image: FloatArray) -> FloatArray:
-    return np.round(image * np.float32(255))
+def small(how: Image.Resampling, times: int = 1) -> Image.Image:
+    return enlarged(BIG).resize((times * SIDE, times * SIDE), how)
+
+
+def light(times: int = 1) -> FloatArray:
+    """The drawing in linear light [levels]."""
+    step = BIG // times
+    parts = LINEAR[np.asarray(enlarged(BIG))].reshape(times * SIDE, step, times * SIDE, step, 3)
+    return np.asarray(parts.mean(axis=(1, 3)), np.float32)
+
+
+def in_linear_light() -> Image.Image:
+    return Image.fromarray(np.searchsorted(MIDDLES, light()).astype(np.uint8))
+
+
+BOX = Image.Resampling.BOX
+
+MADE: dict[str, Callable[[], Image.Image]] = {
+    "blurred": lambda: small(BOX).filter(ImageFilter.GaussianBlur(0.7)),
+    "sharpened": lambda: small(BOX).filter(ImageFilter.UnsharpMask(1, 80, 0)),
+    "by Lanczos": lambda: small(Image.Resampling.LANCZOS),
+    "by bicubic": lambda: small(Image.Resampling.BICUBIC),
+    "in linear light": in_linear_light,
+}
+
+
+def pixels(image: Image.Image) -> FloatArray:
+    return np.asarray(image, np.float32) / np.float32(255)
 
 
 def psnr(a: FloatArray, b: FloatArray) -> float:
     return metrics.psnr(255 * a, 255 * b)
 
 
-def drawn(image: FloatArray, **given: str) -> FloatArray:
+def drawn(image: FloatArray, times: int = 1, **given: str) -> FloatArray:
+    """A drawing of an image as a viewer shows it."""
     svg = warpsplat.vectorize(image, subject="drawing", **given).svg
-    return np.asarray(np.asarray(on_white(render_svg(svg))) / 255, np.float32)
+    return np.asarray(np.asarray(on_white(render_svg(svg, zoom=times))) / 255, np.float32)
 
 
-def blurred(image: FloatArray, optics: Optics = GAUSS) -> FloatArray:
-    return (np.clip(np.round(optics(levels(image))), 0, 255) / 255).astype(np.float32)
+def show(scene: Scene) -> FloatArray:
+    return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
 
-def test_the_places_of_the_rings_are_all_of_the_square() -> None:
-    places = sorted(place for ring in RINGS for place in ring)
-    assert places == [(y, x) for y in range(-2, 3) for x in range(-2, 3)]
+def untouched(image: FloatArray, over: Callable[[], bool] = lambda: False) -> tuple[FloatArray, int]:
+    """An image without its optics, and how often it was traced."""
+    times = 0
+
+    def traced(each: FloatArray) -> Traced:
+        nonlocal times
+        times += 1
+        return trace(each)
+
+    result, _ = without_optics(image, None, traced, show, over)
+    return result, times
 
 
-@pytest.mark.parametrize("weights", [GAUSS.weights, (1.4, -0.08, -0.02, 0.0, 0.0, 0.0)])
-def test_a_kernel_is_found(weights: tuple[float, ...]) -> None:
-    beside = sum(len(ring) * weight for ring, weight in zip(RINGS[1:], weights[1:], strict=True))
-    true = Optics((1 - beside, *weights[1:]))
-    image = np.round(levels(draw(BODY)[..., :3]) / 2 + 60)  # nothing is clipped
-    found = find_optics(image / 255, np.round(true(image)) / 255)
-    np.testing.assert_allclose(found.optics.weights, true.weights, atol=0.003)
-    assert found.error < 0.01 * found.without
+def test_the_samples_of_a_kernel_are_those_of_a_square() -> None:
+    assert sum(COUNTS) == (2 * RADIUS) ** 2
+    assert len(set(RINGS)) == len(RINGS)
 
 
-def test_an_image_without_edges_tells_nothing() -> None:
-    flat = np.full((20, 30, 3), 0.3, np.float32)
-    found = find_optics(flat, flat)
-    assert found.optics.weights == (1.0, 0, 0, 0, 0, 0) and found.error == found.without == 0
+@pytest.mark.parametrize("how", MADE)
+def test_a_sharp_image_tells_how_a_picture_was_made(how: str) -> None:
+    """Through the optics it is the picture, which without them is what means of pixels would be."""
+    picture, fine = pixels(MADE[how]()), pixels(small(BOX, SCALE))
+    seen = Seen.of(picture)
+    found = seen.find(fine, light(SCALE) / np.float32(255) if seen.edges.is_linear else None)
+    plain = pixels(small(BOX))
+    assert seen.edges.is_linear == (how == "in linear light")
+    assert psnr(found.shown, picture) > psnr(plain, picture) + 8
+    assert psnr(found.undone, plain) > psnr(picture, plain) + 8
+    assert found.error < found.without / 5
 
 
-def test_an_image_that_is_as_it_was_drawn_stays() -> None:
-    image = draw(BODY)
-    pixels, trace = without_optics(image, lambda pixels: pixels, lambda trace: trace, lambda: False)
-    assert pixels is image and trace is image
+def test_means_of_pixels_have_no_optics() -> None:
+    found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))
+    np.testing.assert_allclose(found.kernel, NONE, atol=2e-3)
 
 
-def test_without_time_nothing_is_looked_for() -> None:
-    image = blurred(draw(BODY))
-    pixels, _ = without_optics(image, lambda pixels: draw(BODY), lambda trace: trace, lambda: True)
-    assert pixels is image
+@pytest.mark.parametrize("color", [(0.3, 0.3, 0.3), (1, 1, 1)])
+def test_an_image_without_edges_tells_nothing(color: tuple[float, ...]) -> None:
+    flat = np.full((20, 30, 3), color, np.float32)
+    found = Seen.of(flat).find(np.full((40, 60, 3), color, np.float32))
+    assert found.kernel == NONE and found.error == found.without == 0
+    np.testing.assert_allclose(found.undone, flat, atol=0.003)
 
 
-def test_a_blurred_picture_is_as_it_was_where_its_trace_is_right() -> None:
-    image = draw(BODY)
-    pixels, _ = without_optics(blurred(image), lambda pixels: image, lambda trace: trace, lambda: False)
-    assert psnr(pixels, image) > 45
+def test_steps_of_pixels_tell_nothing() -> None:
+    """Any kernel that sharpens would explain them."""
+    ink = np.where(np.asarray(small(BOX).convert("L")) < 128, 0, 255)
+    image = np.repeat(ink[..., None], 3, axis=2).astype(np.float32) / 255
+    assert Seen.of(image).find(pixels(small(BOX, SCALE))).kernel == NONE
 
 
 def test_colours_stay_below_opacity() -> None:
-    image = np.concatenate([draw(BODY) * 0.5, np.full((96, 96, 1), 0.5, np.float32)], axis=2)
-    pixels, _ = without_optics(blurred(image), lambda pixels: image, lambda trace: trace, lambda: False)
-    assert (pixels[..., :3] <= pixels[..., 3:]).all()
+    planes = [pixels(small(BOX, SCALE)) * 0.5, np.full((SCALE * SIDE, SCALE * SIDE, 1), 0.5, np.float32)]
+    fine = np.concatenate(planes, axis=2)
+    half = [pixels(MADE["blurred"]()) * 0.5, np.full((SIDE, SIDE, 1), 0.5, np.float32)]
+    undone = Seen.of(np.concatenate(half, axis=2)).find(fine).undone
+    assert (undone[..., :3] <= undone[..., 3:]).all()
 
 
-@pytest.mark.parametrize("quality", ["draft", "balanced"])
-def test_a_blurred_drawing_is_drawn_sharp(quality: str) -> None:
-    """It is nearer to the drawing than the picture is, and of few nodes."""
-    image = draw(BODY)
-    made = warpsplat.vectorize(blurred(image), subject="drawing", quality=quality)
-    shown = np.asarray(on_white(render_svg(made.svg)), np.float32) / 255
-    assert psnr(shown, image) > psnr(blurred(image), image) + 4
-    assert len(made.svg) < 1500
+def test_an_image_that_is_as_it_was_drawn_stays() -> None:
+    image = pixels(small(BOX))
+    result, times = untouched(image)
+    assert result is image and times == 1
 
 
-def test_a_fit_through_optics_is_like_the_picture_through_them() -> None:
-    image = draw(BODY)
-    shown = drawn(blurred(image))
-    assert psnr(blurred(shown), blurred(image)) > 40
-    assert psnr(shown, image) > 33
+def test_without_time_nothing_is_looked_for() -> None:
+    image = pixels(MADE["blurred"]())
+    result, times = untouched(image, lambda: True)
+    assert result is image and times == 1
 
 
-def test_optics_may_be_left_as_they_are() -> None:
-    image = draw(BODY)
-    seen = blurred(image)
-    sharp, soft = drawn(seen), drawn(seen, optics="none")
-    assert psnr(soft, seen) > psnr(sharp, seen)
-    assert psnr(soft, image) < psnr(sharp, image) - 3
+@pytest.mark.parametrize("how", MADE)
+def test_a_drawing_is_what_it_was_before(how: str) -> None:
+    """It is nearer to the source, four times as large, than without its optics, and as small."""
+    picture, source = pixels(MADE[how]()), pixels(enlarged(4))
+    sharp, soft = (drawn(picture, 4, optics=optics) for optics in ("auto", "none"))
+    assert psnr(sharp, source) > psnr(soft, source) + 0.5
+    assert psnr(sharp, source) > 36
+    assert len(warpsplat.vectorize(picture, subject="drawing").svg) < 1200
+
+
+def test_a_blurred_draft_is_drawn_sharp() -> None:
+    picture, source = pixels(MADE["blurred"]()), pixels(small(BOX))
+    assert psnr(drawn(picture, quality="draft"), source) > psnr(picture, source) + 4

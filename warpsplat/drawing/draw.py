@@ -12,10 +12,11 @@ from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import Sheet
 from warpsplat.drawing.glyphs import find_glyphs
-from warpsplat.drawing.optics import without_optics
+from warpsplat.drawing.optics import SCALE
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import TRACED_PSNR
+from warpsplat.drawing.without_optics import without_optics
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.palette import solid_shapes
@@ -148,13 +149,12 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
     def trace(pixels: FloatArray) -> _Trace:
         return _traced(replace(picture, pixels=pixels), settings, run, most, byte_price(settings))
 
-    def show(found: _Trace) -> FloatArray:
-        text = finished(found.scene, settings, DRAFT_GRID)
-        return shown_image(text, found.scene, picture.pixels.shape[2])
+    def show(scene: Scene) -> FloatArray:
+        return shown_image(finished(scene, settings, DRAFT_GRID / SCALE), scene, picture.pixels.shape[2])
 
     if settings.optics == "none":
         return picture, trace(picture.pixels)
-    pixels, found = without_optics(picture.pixels, trace, show, run.over)
+    pixels, found = without_optics(picture.pixels, picture.noise, trace, show, run.over)
     seen = None if pixels is picture.pixels else picture.pixels
     return replace(picture, pixels=pixels, seen=seen), found
 

@@ -1,151 +1,226 @@
-"""What blurred or sharpened a picture after its shapes became pixels: found from the picture, and undone.
+"""How a picture was made of sharp shapes.
 
-Scanners, cameras and programs that resize convolve an image with a small symmetric kernel. A trace of the
-picture tells it: the kernel with which the trace's exact render is nearest to the picture. Without it, the
-picture is what it is less the convolved render, plus the render. Where the trace is right, that is the render
-itself; where it is not yet, the next trace is nearer (back projection: Irani and Peleg 1991, "Improving
-resolution by image registration").
+Scanners, cameras and programs that resize mix colours in sRGB or in linear light, convolve them with a small
+symmetric kernel, and clip what goes beyond black and white. Clean edges tell the light. A sharp image that is
+about right tells the kernel: the one with which it is nearest to the picture. The picture without them is
+what it is, less what the sharp image becomes through them, plus the sharp image (back projection: Irani and
+Peleg 1991, "Improving resolution by image registration").
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from functools import reduce
 
+import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.denoise import has_blurred_colors
+from warpsplat.drawing.edges import LINEAR, MIDDLES, Edges, find_edges
+from warpsplat.drawing.trace.grids import Bools, Box, Floats, Ints, channel_max, dilated
+from warpsplat.drawing.trace.seeds import ROUNDING, noise_of
 from warpsplat.portable.linear import solve
-from warpsplat.scene import FloatArray
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.geometry import enlarged
 
-RADIUS = 2
-"""Radius of the kernel [px]."""
+SCALE = 2
+"""Samples of a sharp image along a pixel: coverage of whole pixels does not tell what Lanczos or bicubic
+filters leave of finer parts."""
 
-TURNS = 6
-"""Traces from which it is found, at the most."""
+RADIUS = 5
+"""Samples of the kernel on each side of the middle of a pixel."""
 
-LIKELY, CLEARLY = 0.9, 0.75
-"""Share of the squared error without a kernel that one must leave less than for a trace through it to be
-tried, and for that to be kept: blurred pictures have .5 and less."""
+ROUNDS = 4
+"""Solutions for a kernel, as each tells which pixels it would clip."""
 
-RINGS = [
-    sorted({(up * y, left * x) for y, x in ((a, b), (b, a)) for up in (1, -1) for left in (1, -1)})
-    for a in range(RADIUS + 1)
-    for b in range(a + 1)
-]
-"""Places of a kernel (row, column) that have one weight, as it is symmetric to the axes and diagonals."""
+RIDGE = 0.01
+"""What the mean of the diagonal counts besides in the normal equations: edges of few directions leave weights
+open, which stay small then."""
 
-LIGHTNESS = np.array([5, 9, 2], np.float32)
-"""Shares of the channels, about, in what JPEG keeps at full resolution (ITU-T T.871): whole numbers, small
-enough for exact sums over an image."""
+CLEAN = 16
+"""Weight of clean edges: elsewhere, what a trace does not tell is taken for blur."""
 
-Traced = TypeVar("Traced")
+RINGS = [(a, b) for a in range(RADIUS) for b in range(a + 1)]
+"""Distances of the samples of one weight from the middle of a pixel, along the two sides in any order: 0 is
+the nearest. The kernel is symmetric to the axes and diagonals."""
 
+COUNTS = [4 if a == b else 8 for a, b in RINGS]
+"""How many samples those are."""
 
-@dataclass(frozen=True)
-class Optics:
-    """A kernel with a weight for the places of each of RINGS; those of all places add up to 1."""
+LIGHTNESS = np.array([5, 9, 2], np.float32) / 16
+"""Shares of the channels, about, in what JPEG keeps at full resolution (ITU-T T.871)."""
 
-    weights: tuple[float, ...]
+Kernel = tuple[float, ...]
+"""A weight for the samples of each of RINGS; those of all samples add up to 1."""
 
-    def __call__(self, image: Floats) -> Floats:
-        """Return an image, shape (height, width, channel), convolved with the kernel."""
-        total = np.zeros_like(image)
-        for weight, ring in zip(self.weights, _rings(image), strict=True):
-            total += np.float32(weight) * ring
-        return total
+NONE = (1 / COUNTS[0], *(0.0,) * (len(RINGS) - 1))
+"""Each pixel is the mean of its samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
     """The optics that bring a sharp image nearest to a picture."""
 
-    optics: Optics
+    kernel: Kernel
     error: float
-    """Sum of squared errors with them, in whole levels of lightness."""
+    """Sum of squared errors beside edges, with them [levels squared]."""
     without: float
     """The same without."""
-    sharp: Floats
-    """The sharp image, in whole levels."""
-    seen: Floats
-    """The picture, likewise."""
-
-    def undone(self) -> FloatArray:
-        """Return the picture without the optics, sRGB in [0, 1]."""
-        levels = np.clip(np.round(self.seen - self.optics(self.sharp) + self.sharp), 0, 255)
-        if levels.shape[2] == 4:
-            levels = np.minimum(levels, levels[..., 3:])
-        return np.asarray(levels / np.float32(255), np.float32)
+    shown: FloatArray
+    """The sharp image through the optics, sRGB in [0, 1], shape (height, width, channel)."""
+    undone: FloatArray
+    """The picture without the optics, likewise."""
 
 
-def find_optics(sharp: FloatArray, seen: FloatArray) -> Found:
-    """Return the optics that bring a sharp image nearest to a picture.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A picture whose optics are looked for."""
 
-    Args:
-        sharp: sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity, (height, width, 4).
-        seen: Likewise; only the lightness of both counts.
-    """
-    sharp, seen = _levels(sharp), _levels(seen)
-    light = ((image[..., :3] * LIGHTNESS).sum(axis=2, keepdims=True) for image in (sharp, seen))
-    return Found(*_nearest(*light), sharp, seen)
+    levels: Floats
+    uneven: Bools
+    """The pixels that are not flat, shape (height, width)."""
+    edges: Edges
+    noise: float
+    """Of flat colours [levels]."""
+    has_colors: bool
+    """Whether its colours have the resolution of its lightness, and tell the optics, too."""
 
+    @classmethod
+    def of(cls, image: FloatArray, noise: float | None = None) -> Seen:
+        """Return an image, sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity.
 
-def _nearest(sharp: Floats, seen: Floats) -> tuple[Optics, float, float]:
-    """Return the optics that bring an image nearest to another, and the squared errors with and without.
+        ``noise``: of flat colours [levels]; None: measured.
+        """
+        levels = _levels(image)
+        noise = noise_of(levels) if noise is None else noise
+        edges, uneven = find_edges(levels, noise), _uneven(levels, ROUNDING + noise)
+        return cls(levels, uneven, edges, noise, not has_blurred_colors(image))
 
-    Both are of one channel, in whole levels.
-    """
-    center, *rings = _rings(sharp)
-    columns = [ring - len(places) * center for ring, places in zip(rings, RINGS[1:], strict=True)]
-    inside = np.any([column != 0 for column in columns], axis=0)
-    # Sums of products of whole numbers are exact, and so the same in any order.
-    table = np.array([column[inside] for column in (*columns, seen - sharp)], np.float64)
-    products = np.array([[(one * other).sum() for one in table] for other in table])
-    normal, right, without = products[:-1, :-1], products[:-1, -1], float(products[-1, -1])
-    try:
-        weights = solve(normal, right)
-    except np.linalg.LinAlgError:  # no edges, or all alike
-        return Optics((1.0, *(0.0,) * len(columns))), without, without
-    error = without - float((weights * right).sum())
-    beside = sum(len(places) * weight for places, weight in zip(RINGS[1:], weights.tolist(), strict=True))
-    return Optics((1 - beside, *weights.tolist())), error, without
+    def part(self, box: Box) -> Seen:
+        """Return a part of it."""
+        some = box.slices()
+        edges = replace(self.edges, plain=self.edges.plain[some], clean=self.edges.clean[some])
+        return replace(self, levels=self.levels[some], uneven=self.uneven[some], edges=edges)
 
+    def plain(self, image: FloatArray | None = None) -> FloatArray:
+        """Return this, or an image made of it, with clean edges of two colours."""
+        if image is None:
+            return _image(self.edges.plain)
+        return _image(find_edges(_levels(image), self.noise, is_linear=False).plain)
 
-def without_optics(
-    pixels: FloatArray,
-    trace: Callable[[FloatArray], Traced],
-    show: Callable[[Traced], FloatArray],
-    over: Callable[[], bool],
-) -> tuple[FloatArray, Traced]:
-    """Return pixels as they were before they were blurred or sharpened, and their trace.
+    def scenes(self, scene: Scene, part: Box | None = None) -> list[Scene]:
+        """Return scenes whose images ``find`` takes; ``part``: only these pixels, all by default."""
+        part = part or Box(0, 0, scene.canvas.width, scene.canvas.height)
+        frames = scene.frames.copy()
+        frames[:, :2] -= part[:2]
+        shifted = replace(scene, points=scene.points - np.array(part[:2], np.float32), frames=frames)
+        fine = enlarged(shifted, SCALE, SCALE * (part.right - part.left), SCALE * (part.bottom - part.top))
+        return [fine, _in_light(fine)] if self.edges.is_linear else [fine]
 
-    Args:
-        pixels: sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity, (height, width, 4).
-        trace: Traces such pixels.
-        show: Renders a trace, likewise.
-        over: Returns whether there is no time left.
+    def find(self, fine: FloatArray, light: FloatArray | None = None) -> Found:
+        """Return the optics that bring a sharp image nearest to this one.
 
-    Returns:
-        ``pixels`` itself if no optics explain it clearly better than its trace does.
-    """
-    first = best = pixels, trace(pixels)
-    bound, (current, traced) = np.inf, first
-    for turn in range(TURNS):
-        found = find_optics(show(traced), pixels)
-        if turn == 0:
-            if found.error >= LIKELY * found.without:
+        Args:
+            fine: As this one, shape (SCALE height, SCALE width, channel).
+            light: The same in the light in which colours were mixed, if that is not sRGB.
+        """
+        fine = _levels(fine)
+        mean = reduce(np.add, [fine[y::SCALE, x::SCALE] for y, x in np.ndindex(SCALE, SCALE)]) / COUNTS[0]
+        beside = dilated(self.uneven | _uneven(fine, 0)[::SCALE, ::SCALE], 2 * RADIUS // SCALE)
+        some = np.nonzero(beside)
+        rings = _rings(fine if light is None else _levels(light), *some)
+        steps = self._steps(fine, some)
+        kernel, error = self._kernel(rings, steps, some)
+        through = self._seen(_summed(kernel, rings))
+        without = _squared(self._planes(self.levels[some] - _rounded(mean[some])))
+        undone, shown = self.levels.copy(), _rounded(mean)
+        undone[some] = mean[some] + self._residual(through, steps, some)
+        shown[some] = through
+        return Found(kernel, error, without, _image(shown), _image(undone))
+
+    def _kernel(self, rings: list[Floats], steps: Floats, some: tuple[Ints, ...]) -> tuple[Kernel, float]:
+        """Return the kernel for some pixels, and the squared error with it."""
+        light = self._planes(self._light(self.levels[some]))
+        planes = [self._planes(ring) for ring in rings]
+        center = planes[0] / COUNTS[0]
+        columns = [ring - n * center for ring, n in zip(planes[1:], COUNTS[1:], strict=True)]
+        table = np.array(columns, np.float64).reshape(len(columns), -1)
+        right = (light - center).reshape(-1).astype(np.float64)
+        weight = usual = np.repeat(np.where(self.edges.clean[some], CLEAN, 1), light.shape[1])
+
+        def left(tried: Kernel) -> float:
+            return _squared(self._planes(self._residual(self._seen(_summed(tried, rings)), steps, some)))
+
+        kernel, error = NONE, left(NONE)
+        told = int(((light > 0) & (light < 255)).sum())
+        for _ in range(ROUNDS if told > len(table) else 0):
+            # Sums of products of whole numbers are exact, and so the same in any order.
+            weighted = table * weight
+            normal = np.array([[(one * other).sum() for one in weighted] for other in table])
+            normal += RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+            try:
+                solved = solve(normal, np.array([(one * right).sum() for one in weighted])).tolist()
+            except np.linalg.LinAlgError:  # no edges, or all alike
                 break
-            bound = CLEARLY * found.without
-        elif found.error >= bound:
-            break
-        else:
-            bound, best = found.error, (current, traced)
-        if over():
-            break
-        current = found.undone()
-        traced = trace(current)
-    return best
+            tried = ((1 - sum(n * w for n, w in zip(COUNTS[1:], solved, strict=True))) / COUNTS[0], *solved)
+            now = left(tried)
+            if now < error:
+                kernel, error = tried, now
+            # What is beyond black or white tells no more than that.
+            raw = _summed(tried, planes)
+            clipped = ((light <= 0) & (raw < 0)) | ((light >= 255) & (raw > 255))
+            before, weight = weight, np.where(clipped.reshape(-1), 0, usual)
+            if (weight == before).all():
+                break
+        return kernel, error
+
+    def _steps(self, fine: Floats, some: tuple[Ints, ...]) -> Floats:
+        """Return how far colours around some pixels are apart, over how far in light, (pixel, channel)."""
+        if not self.edges.is_linear:
+            return np.ones((len(some[0]), fine.shape[2]), np.float32)
+        window = np.ones((2 * RADIUS - 1, 2 * RADIUS - 1), np.uint8)
+        low, high = (
+            change(fine.astype(np.uint8), window)[::SCALE, ::SCALE][some].astype(np.float32)
+            for change in (cv2.erode, cv2.dilate)
+        )
+        return np.where(
+            high > low, (high - low) / np.maximum(self._light(high) - self._light(low), 1 / 16), 1
+        )
+
+    def _residual(self, through: Floats, steps: Floats, some: tuple[Ints, ...]) -> Floats:
+        """Return what some pixels show beyond a sharp image, as if colours were mixed in sRGB [levels].
+
+        ``through``: what it becomes through the optics, shape (pixel, channel).
+        """
+        return np.round(16 * (self._light(self.levels[some]) - self._light(through)) * steps) / 16
+
+    def _light(self, levels: Floats) -> Floats:
+        """Return whole levels in the light in which colours were mixed."""
+        return LINEAR[levels.astype(np.intp)] if self.edges.is_linear else levels
+
+    def _seen(self, light: Floats) -> Floats:
+        """Return whole levels of such light."""
+        if self.edges.is_linear:
+            return np.searchsorted(MIDDLES, light).astype(np.float32)
+        return _rounded(light)
+
+    def _planes(self, pixels: Floats) -> Floats:
+        """Return what of pixels (pixel, channel), or sums of them, tells optics, shape (pixel, plane)."""
+        if self.has_colors:
+            return pixels
+        return np.round((pixels[:, :3] * LIGHTNESS).sum(axis=1, keepdims=True))
+
+
+def _in_light(scene: Scene) -> Scene:
+    """Return a scene with its colours in linear light."""
+
+    def linear(colors: FloatArray) -> FloatArray:
+        levels = np.clip(np.round(colors * 255), 0, 255)
+        return np.asarray(LINEAR[levels.astype(np.intp)] / np.float32(255), np.float32)
+
+    ground = scene.canvas.background
+    canvas = replace(scene.canvas, background=None if ground is None else linear(ground))
+    return replace(scene, colors=linear(scene.colors), stop_colors=linear(scene.stop_colors), canvas=canvas)
 
 
 def _levels(pixels: FloatArray) -> Floats:
@@ -153,14 +228,55 @@ def _levels(pixels: FloatArray) -> Floats:
     return np.asarray(np.round(pixels * np.float32(255)), np.float32)
 
 
-def _rings(image: Floats) -> list[Floats]:
-    """Return the sum of the pixels at the places of each ring around each pixel."""
-    height, width = image.shape[:2]
-    wide = np.pad(image, [(RADIUS, RADIUS), (RADIUS, RADIUS), (0, 0)], mode="edge")
-    found = []
-    for places in RINGS:
-        total = np.zeros_like(image)
-        for y, x in places:
-            total += wide[RADIUS + y : RADIUS + y + height, RADIUS + x : RADIUS + x + width]
-        found.append(total)
-    return found
+def _image(levels: Floats) -> FloatArray:
+    """Return levels as values in [0, 1], colours not beyond opacity."""
+    levels = np.clip(np.round(levels), 0, 255)
+    if levels.shape[2] == 4:
+        levels = np.minimum(levels, levels[..., 3:])
+    return np.asarray(levels / np.float32(255), np.float32)
+
+
+def _uneven(image: Floats, tolerance: float) -> Bools:
+    """Return the pixels that differ from one beside them by more than a tolerance, shape (height, width)."""
+    uneven = np.zeros(image.shape[:2], np.bool_)
+    across, down = (channel_max(np.abs(np.diff(image, axis=axis))) > tolerance for axis in (1, 0))
+    uneven[:, 1:] |= across
+    uneven[:, :-1] |= across
+    uneven[1:] |= down
+    uneven[:-1] |= down
+    return uneven
+
+
+def _summed(kernel: Kernel, rings: list[Floats]) -> Floats:
+    """Return the sum of rings by their weights."""
+    total = np.zeros_like(rings[0])
+    for weight, ring in zip(kernel, rings, strict=True):
+        total += np.float32(weight) * ring
+    return total
+
+
+def _rounded(levels: Floats) -> Floats:
+    return np.clip(np.round(levels), 0, 255)
+
+
+def _squared(difference: Floats) -> float:
+    return float(np.square(difference, dtype=np.float64).sum())
+
+
+def _rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
+    """Return the sum of the samples of each of RINGS around some pixels, shape (pixel, channel)."""
+    before, width = RADIUS - SCALE // 2, fine.shape[1] // SCALE
+    wide = np.pad(fine, [(before, before), (before, before), (0, 0)], mode="edge")
+    pairs = [(RADIUS - 1 - away, RADIUS + away) for away in range(RADIUS)]
+    last = SCALE * (width - 1) + 1
+    sums = [
+        (wide[:, low : low + last : SCALE] + wide[:, high : high + last : SCALE]).reshape(-1, fine.shape[2])
+        for low, high in pairs
+    ]
+
+    def both(across: int, down: int) -> Floats:
+        """Return the sum of the four samples that are so far away along the two sides."""
+        low, high = ((SCALE * rows + at) * width + columns for at in pairs[down])
+        return sums[across].take(low, axis=0) + sums[across].take(high, axis=0)
+
+    return [both(a, b) if a == b else both(a, b) + both(b, a) for a, b in RINGS]

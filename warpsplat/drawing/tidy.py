@@ -16,7 +16,7 @@ from warpsplat.drawing.crossings import crossing
 from warpsplat.drawing.equal import Equal, on_grid, with_equal_outlines
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import apart, applied, candidates
-from warpsplat.drawing.optics import find_optics
+from warpsplat.drawing.optics import Seen
 from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.shapes import shape_changes
 from warpsplat.fit.problem import Run
@@ -119,14 +119,15 @@ def _through_optics(
     fit: OutlineFit, target: FloatArray, run: Run, seen: FloatArray | None
 ) -> tuple[OutlineFit, FloatArray]:
     """Return a fit to what the optics leave of an image, and that, by what the fit shows."""
-    for _ in range(TURNS if seen is not None else 0):
+    if seen is None:
+        return fit, target
+    picture = Seen.of(matching(seen, fit.drawing.scene.canvas))
+    for _ in range(TURNS):
         if run.over():
             break
         drawing = fit.drawing
-        assert seen is not None
-        target = find_optics(
-            render(drawing.scene, backend=run.backend), matching(seen, drawing.scene.canvas)
-        ).undone()
+        scenes = picture.scenes(drawing.scene)
+        target = picture.find(*(render(scene, backend=run.backend) for scene in scenes)).undone
         fit = OutlineFit(target, drawing, run)
         fit.advance(run, SECOND_STEPS)
     return fit, target

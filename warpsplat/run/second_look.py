@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.optics import find_optics
+from warpsplat.drawing.optics import SCALE, Seen
 from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.problem import Fit, Problem
 from warpsplat.fit.settings import SUBJECTS, Subject, make_settings
@@ -46,8 +46,10 @@ def other_subject(made: Fit, problem: Problem) -> Subject | None:
     if psnr_of_file(text, target) >= enough:
         return None
     # A drawing is sharp where the image may not be.
-    shown = shown_image(text, made.scene, target.shape[2])
-    return other if _psnr(find_optics(shown, target).optics(shown), target) < enough else None
+    seen, grid = Seen.of(target), made.per_pixel / SCALE
+    scenes = seen.scenes(made.scene)
+    images = (shown_image(finished(scene, settings, grid), scene, target.shape[2]) for scene in scenes)
+    return other if _psnr(seen.find(*images).shown, target) < enough else None
 
 
 def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:

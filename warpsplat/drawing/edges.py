@@ -1,0 +1,177 @@
+"""Clean edges of a picture: those between two flat colours, which tell how it was made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max
+from warpsplat.drawing.trace.mixtures import MIXED, mixed
+from warpsplat.drawing.trace.seeds import EDGE, ROUNDING
+from warpsplat.portable import elementary
+from warpsplat.scene.scene import ranges
+
+FLAT = 3
+"""Pixels in a row that are flat between edges."""
+
+WIDEST = 7
+"""Pixels of an edge with its rings, at the most: what a kernel of five pixels makes of a step."""
+
+OVERSHOOT = 0.5
+"""Share of an edge's step that its rings are at the most: outlines differ by more."""
+
+SURE = 3.0
+"""Standard deviations that votes for linear light are ahead by."""
+
+SHADES = np.arange(256) / 255
+LINEAR = (
+    np.round(
+        16
+        * 255
+        * np.where(SHADES <= 0.04045, SHADES / 12.92, elementary.power((SHADES + 0.055) / 1.055, 2.4))
+    )
+    / 16
+).astype(np.float32)
+"""The linear light of each level of sRGB, in sixteenths of levels, so that sums are exact (IEC 61966-2-1)."""
+
+MIDDLES = (LINEAR[1:] + LINEAR[:-1]) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The clean edges of an image."""
+
+    plain: Floats
+    """The image with their pixels as mixtures of their two colours, shape (height, width, channel)."""
+    clean: Bools
+    """Their pixels, shape (height, width)."""
+    has_rings: bool
+    """Whether most begin or end with pixels beyond their colours, as filters that sharpen leave."""
+    is_linear: bool
+    """Whether their colours were mixed in linear light."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Where rows of an image cross its clean edges."""
+
+    rows: Ints
+    before: Ints
+    """The last flat pixel before each edge."""
+    after: Ints
+    one: Floats
+    """The colour there, shape (crossing, channel)."""
+    other: Floats
+    """That after the edge."""
+    owner: Ints
+    """The crossing of each pixel between."""
+    columns: Ints
+    """The column of each."""
+
+
+def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = None) -> Edges:
+    """Find the clean edges of an image.
+
+    Args:
+        image: Whole levels, shape (height, width, channel).
+        noise: Of flat colours [levels].
+        is_linear: Whether it was mixed in linear light; None: not known.
+    """
+    tolerance = ROUNDING + noise
+    sides = [image, image.swapaxes(0, 1)]
+    crossings = [_crossings(side, tolerance) for side in sides]
+    if image.shape[2] == 4:
+        is_linear = False
+    if is_linear is None:
+        votes = [_votes(side, found, tolerance) for side, found in zip(sides, crossings, strict=True)]
+        linear, gamma = (sum(vote[i] for vote in votes) for i in (0, 1))
+        is_linear = linear - gamma > SURE * float(np.sqrt(linear + gamma))
+    plain, clean = image.copy(), np.zeros(image.shape[:2], np.bool_)
+    count, ringed = 0, 0
+    for side, found, out, done in zip(
+        sides, crossings, (plain, plain.swapaxes(0, 1)), (clean, clean.T), strict=True
+    ):
+        one, other = found.one[found.owner], found.other[found.owner]
+        at = found.rows[found.owner], found.columns
+        low, high = (_is_ring(side[at], *pair, tolerance) for pair in ((one, other), (other, one)))
+        share, off = mixed(side[at], one, other)
+        between = off <= MIXED
+        color = np.where(low[:, None], one, np.where(high[:, None], other, side[at]))
+        if is_linear:
+            light = [LINEAR[np.asarray(each, np.intp)] for each in (side[at], one, other)]
+            share = np.clip(mixed(*light)[0], 0, 1)[:, None]
+            color = np.where(
+                (between & ~low & ~high)[:, None], np.round(share * one + (1 - share) * other), color
+            )
+        some = (low | high | between) & ~done[at]
+        out[at[0][some], at[1][some]], done[at[0][some], at[1][some]] = color[some], True
+        first, last = (
+            found.columns == found.before[found.owner] + 1,
+            found.columns == found.after[found.owner] - 1,
+        )
+        count += len(found.rows)
+        ringed += len(np.unique(found.owner[(low & first) | (high & last)]))
+    return Edges(plain, clean, 2 * ringed > count, is_linear)
+
+
+def _crossings(image: Floats, tolerance: float) -> _Crossings:
+    """Return where the rows of an image cross its clean edges."""
+    width = image.shape[1]
+    same = channel_max(np.abs(np.diff(image, axis=1))) <= tolerance
+    flat = np.zeros(image.shape[:2], np.bool_)
+    count = max(width - FLAT + 1, 0)
+    runs = np.logical_and.reduce([same[:, k : k + count] for k in range(FLAT - 1)])
+    for k in range(FLAT):
+        flat[:, k : k + count] |= runs
+    rows, before = np.nonzero(flat[:, :-1] & ~flat[:, 1:])
+    ends_rows, after = np.nonzero(flat[:, 1:] & ~flat[:, :-1])
+    # The next end in the same row, if there is one.
+    number = np.searchsorted(ends_rows * width + after + 1, rows * width + before)
+    known = number < len(after)
+    rows, before, number = rows[known], before[known], number[known]
+    after = after[number] + 1
+    near = (ends_rows[number] == rows) & (after - before <= WIDEST + 1)
+    rows, before, after = rows[near], before[near], after[near]
+    one, other = image[rows, before], image[rows, after]
+    step = channel_max(np.abs(other - one)) > EDGE
+    rows, before, after, one, other = (each[step] for each in (rows, before, after, one, other))
+    counts = after - before - 1
+    columns = ranges(before + 1, counts)
+    return _Crossings(rows, before, after, one, other, np.repeat(np.arange(len(rows)), counts), columns)
+
+
+def _is_ring(pixels: Floats, near: Floats, far: Floats, tolerance: float) -> Bools:
+    """Return where pixels are beyond a colour in all channels, seen from another one."""
+    beyond = (near - pixels) * np.where(far < near, -1, 1)
+    excess = np.maximum(-beyond, beyond - OVERSHOOT * np.abs(far - near))
+    return np.asarray(channel_max(excess) <= tolerance)
+
+
+def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int]:
+    """Return how many crossings say that colours were mixed in linear light, and how many in sRGB.
+
+    The area beside a straight edge changes evenly from row to row, in the light in which colours were mixed.
+    """
+    after = np.full((image.shape[0] + 2, image.shape[1] + 4), -1)
+    after[found.rows + 1, found.before + 2] = np.arange(len(found.rows))
+    beside = []
+    for down in (-1, 1):
+        number = np.full(len(found.rows), -1)
+        for right in (2, -2, 1, -1, 0):
+            other = after[found.rows + 1 + down, found.before + 2 + right]
+            same = [channel_max(np.abs(c - c[other])) <= tolerance for c in (found.one, found.other)]
+            is_next = (other >= 0) & same[0] & same[1]
+            number[is_next] = other[is_next]
+        beside.append(number)
+    known = (beside[0] >= 0) & (beside[1] >= 0)
+    bends = []
+    for values in (LINEAR, np.arange(256, dtype=np.float32)):
+        one, other, pixels = (
+            values[np.asarray(each, np.intp)]
+            for each in (found.one, found.other, image[found.rows[found.owner], found.columns])
+        )
+        share, _ = mixed(pixels, one[found.owner], other[found.owner])
+        place = found.before + np.bincount(found.owner, share, len(found.rows))
+        bends.append(np.abs(place[beside[0]] - 2 * place + place[beside[1]])[known])
+    return int((bends[0] < bends[1]).sum()), int((bends[1] < bends[0]).sum())
