@@ -24,6 +24,9 @@ OVERSHOOT = 0.5
 SURE = 3.0
 """Standard deviations that votes for linear light are ahead by."""
 
+SLANT = 0.06
+"""How far an edge moves within two rows, from which on it tells the light [px]."""
+
 SHADES = np.arange(256) / 255
 LINEAR = (
     np.round(
@@ -164,8 +167,7 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
             is_next = (other >= 0) & same[0] & same[1]
             number[is_next] = other[is_next]
         beside.append(number)
-    known = (beside[0] >= 0) & (beside[1] >= 0)
-    bends = []
+    known, bends = (beside[0] >= 0) & (beside[1] >= 0), []
     for values in (LINEAR, np.arange(256, dtype=np.float32)):
         one, other, pixels = (
             values[np.asarray(each, np.intp)]
@@ -173,5 +175,7 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
         )
         share, _ = mixed(pixels, one[found.owner], other[found.owner])
         place = found.before + np.bincount(found.owner, share, len(found.rows))
-        bends.append(np.abs(place[beside[0]] - 2 * place + place[beside[1]])[known])
-    return int((bends[0] < bends[1]).sum()), int((bends[1] < bends[0]).sum())
+        known &= np.abs(place[beside[0]] - place[beside[1]]) > SLANT
+        bends.append(np.abs(place[beside[0]] - 2 * place + place[beside[1]]))
+    linear, gamma = (bend[known] for bend in bends)
+    return int((linear < gamma).sum()), int((gamma < linear).sum())

@@ -147,3 +147,5 @@ class Fit:
     interrupted: bool
     renewed: int = 0
     """How often a shape was reset because of a number that was not finite."""
+    is_sharper: bool = False
+    """Whether it is what the image was before it was blurred, sharpened or mixed in linear light."""

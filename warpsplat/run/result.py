@@ -17,6 +17,7 @@ from warpsplat.files.remote import path_of
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Settings, Subject
 from warpsplat.metrics import Score
+from warpsplat.run.explained import Explained
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 
@@ -86,6 +87,8 @@ class Result:
     """How often a shape was reset in training because of a number that was not finite."""
     reduced: str = ""
     """How the image was reduced to stay below the limit of memory, for people; empty: not at all."""
+    optics: Explained | None = None
+    """How the image was made of the drawing, if that was undone."""
     kept: str = ""
     """Elements that a refined SVG keeps as they are, for people; empty: none."""
 
@@ -154,6 +157,7 @@ class Result:
             "renewed": self.renewed,
             "reduced": self.reduced,
             "missed": list(self.missed),
+            "optics": self.optics.as_dict() if self.optics else None,
             "levels": [asdict(level) for level in self.levels],
         }
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
-from warpsplat.drawing.optics import SCALE, Seen
-from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem
 from warpsplat.fit.settings import SUBJECTS, Subject, make_settings
 from warpsplat.metrics import psnr_of_file
-from warpsplat.portable.elementary import log10
 from warpsplat.portable.filters import resize_area, resize_linear
+from warpsplat.run.explained import explained, psnr_of
 from warpsplat.run.prepare import PreparedImage, choose_subject
 from warpsplat.scene import FloatArray
 
@@ -46,10 +43,7 @@ def other_subject(made: Fit, problem: Problem) -> Subject | None:
     if psnr_of_file(text, target) >= enough:
         return None
     # A drawing is sharp where the image may not be.
-    seen, grid = Seen.of(target), made.per_pixel / SCALE
-    scenes = seen.scenes(made.scene)
-    images = (shown_image(finished(scene, settings, grid), scene, target.shape[2]) for scene in scenes)
-    return other if _psnr(seen.find(*images).shown, target) < enough else None
+    return other if explained(made, problem).psnr < enough else None
 
 
 def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
@@ -62,9 +56,4 @@ def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
 
 def _thumbnail_psnr(target: FloatArray, size: tuple[int, int]) -> float:
     """Return the PSNR of an image made smaller and enlarged again."""
-    return _psnr(resize_linear(resize_area(target, size), target.shape[1::-1]), target)
-
-
-def _psnr(shown: FloatArray, target: FloatArray) -> float:
-    """Return the PSNR of an image; of one with opacity, as on black."""
-    return -10 * float(log10(max(float(np.square(shown - target)[..., :3].mean()), 1e-10)))
+    return psnr_of(resize_linear(resize_area(target, size), target.shape[1::-1]), target)

@@ -21,6 +21,7 @@ from warpsplat.native import release_memory
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
+from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
 from warpsplat.run.prepare import PreparedImage, prepare
@@ -150,6 +151,7 @@ def make_result(
         if run.failures and not (made.iterations or strategy.traces):
             raise run.failures[0]
         report_end(made, run, history)
+        optics = explained(made, problem) if made.is_sharper and not made.interrupted else None
         made = _arranged(made, problem, strategy, run)
         if checkpoint and made.interrupted:
             checkpoint.save()
@@ -184,7 +186,8 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=image.notes,
+            notes=(*image.notes, *([optics.words()] if optics else [])),
+            optics=optics,
             history=tuple(history),
         )
     release_memory()

@@ -1,0 +1,61 @@
+"""How an image was made of a drawing that is sharper than it, and how much of the image that explains."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from warpsplat.drawing.optics import RADIUS, RINGS, SCALE, Seen
+from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.problem import Fit, Problem
+from warpsplat.portable.elementary import log10
+from warpsplat.scene import FloatArray
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How an image was made of a drawing."""
+
+    psnr: float
+    """PSNR of the drawing, seen through what made the image of it, against the image [dB]."""
+    light: str
+    """In which colours were mixed: ``sRGB`` or ``linear``."""
+    kernel: tuple[tuple[float, ...], ...]
+    """Weights of samples at 1/4, 3/4, ... 9/4 px from the middle of a pixel, down and across: a quarter of a
+    symmetric kernel, whose weights add up to 1."""
+
+    def words(self) -> str:
+        """Return a sentence for people."""
+        how = "softened" if 4 * self.kernel[0][0] <= 1 else "sharpened"
+        made = "had its colours mixed in linear light" if self.light == "linear" else f"was {how}"
+        return (
+            f"after it was drawn, the image {made}; through that, the file explains it to {self.psnr:.1f} dB "
+            "(optics 'none' draws it as it is)"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return asdict(self) | {"psnr": round(self.psnr, 3)}
+
+
+def explained(made: Fit, problem: Problem) -> Explained:
+    """Return how the image of a problem was made of a drawing."""
+    seen, target = Seen.of(problem.target), problem.target
+    images = [
+        shown_image(finished(scene, problem.settings, made.per_pixel / SCALE), scene, target.shape[2])
+        for scene in seen.scenes(made.scene)
+    ]
+    found = seen.find(*images)
+    weights = dict(zip(RINGS, found.kernel, strict=True))
+    kernel = tuple(
+        tuple(round(weights[max(y, x), min(y, x)], 5) for x in range(RADIUS)) for y in range(RADIUS)
+    )
+    light = "linear" if seen.edges.is_linear else "sRGB"
+    return Explained(psnr_of(found.shown, target), light, kernel)
+
+
+def psnr_of(shown: FloatArray, target: FloatArray) -> float:
+    """Return the PSNR of an image [dB]; of one with opacity, as on black."""
+    return -10 * float(log10(max(float(np.square(shown - target)[..., :3].mean()), 1e-10)))
