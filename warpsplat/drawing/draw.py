@@ -179,7 +179,7 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
 
         scene = with_strokes(scene, settings, run)
     psnr = done.psnr - 10 * float(elementary.log10(picture.share))
-    grid, is_sharper = done.per_pixel / picture.enlargement, picture.seen is not None
+    grid, is_sharper = done.per_pixel / float(picture.enlargement.mean()), picture.seen is not None
     return Fit(scene, grid, psnr, psnr, 0, run.stopped(), is_sharper=is_sharper)
 
 

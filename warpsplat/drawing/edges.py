@@ -25,7 +25,7 @@ SURE = 3.0
 """Standard deviations that votes for linear light are ahead by."""
 
 SLANT = 0.06
-"""How far an edge moves within two rows, from which on it tells the light [px]."""
+"""How far an edge moves within two rows, to tell in which light it was mixed [px]."""
 
 SHADES = np.arange(256) / 255
 LINEAR = (
@@ -177,5 +177,7 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
         place = found.before + np.bincount(found.owner, share, len(found.rows))
         known &= np.abs(place[beside[0]] - place[beside[1]]) > SLANT
         bends.append(np.abs(place[beside[0]] - 2 * place + place[beside[1]]))
+    # A level more or less at each of the three places bends an edge, too.
+    known &= np.maximum(*bends) * channel_max(np.abs(found.other - found.one)) > 2 * tolerance
     linear, gamma = (bend[known] for bend in bends)
     return int((linear < gamma).sum()), int((gamma < linear).sum())

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.denoise import without_noise
+from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.scene import FloatArray, Scene
@@ -31,8 +32,8 @@ class Picture:
     """sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4)."""
     noise: float | None
     """Noise of mixtures of colours [levels of 255]; None: not known, flat colours may have it too."""
-    enlargement: int
-    """How many times each pixel was repeated along both sides."""
+    enlargement: npt.NDArray[np.float64]
+    """How many times as large the image was made, along x and y."""
     corner: npt.NDArray[np.intp]
     """Where the upper left corner lies in the image before it was enlarged, x and y [px]."""
     original_size: npt.NDArray[np.intp]
@@ -49,7 +50,10 @@ class Picture:
     def of(cls, image: FloatArray) -> Picture:
         """Return the picture of an image."""
         factor = _enlargement(image)
-        pixels, noise = without_noise(np.ascontiguousarray(image[::factor, ::factor]))
+        small = before_enlarging(np.round(image * np.float32(255))) if factor == 1 else None
+        small = np.ascontiguousarray(image[::factor, ::factor]) if small is None else small / np.float32(255)
+        enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
+        pixels, noise = without_noise(small)
         size, thin = np.array(pixels.shape[1::-1]), np.array(margins(pixels, THIN_SIDE))
         box = _drawn_box(pixels)
         first, last = (-thin, size + thin) if box is None else (box[0] - MARGIN, box[1] + MARGIN)
@@ -57,7 +61,7 @@ class Picture:
         widths = [((low - first)[axis], (last - high)[axis]) for axis in (1, 0)]
         wide = np.pad(pixels[low[1] : high[1], low[0] : high[0]], [*widths, (0, 0)], mode="edge")
         drawn = size if box is None else box[1] - box[0]
-        return cls(np.ascontiguousarray(wide), noise, factor, first, size, drawn, bool(thin.any()))
+        return cls(np.ascontiguousarray(wide), noise, enlargement, first, size, drawn, bool(thin.any()))
 
     @property
     def share(self) -> float:
@@ -81,9 +85,18 @@ class Picture:
             # What covers the picture goes on beyond it.
             points = np.where(is_ground & (scene.points <= 0), 0, points)
             points = np.where(is_ground & (scene.points >= inner), self.original_size, points)
-        width, height = (self.enlargement * self.original_size).tolist()
-        return enlarged(
-            replace(scene, points=points.astype(np.float32), frames=frames), self.enlargement, width, height
+        width, height = np.round(self.enlargement * self.original_size).astype(int).tolist()
+        across, down = self.enlargement.tolist()
+        large = enlarged(
+            replace(scene, points=points.astype(np.float32), frames=frames), across, width, height
+        )
+        if down == across:
+            return large
+        sides = np.array([1, down / across])
+        return replace(
+            large,
+            points=(large.points * sides).astype(np.float32),
+            frames=(large.frames * np.tile(sides, 3)).astype(np.float32),
         )
 
 

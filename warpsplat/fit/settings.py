@@ -300,7 +300,7 @@ class Settings:
     detail: float = option(0.5, "Of drawings: from 0, few big shapes, to 1, every speck.", FRACTION, **DRAWN)
     optics: OpticsChoice = option(
         "auto",
-        "Whether a drawing is made sharp where a scan, an enlargement or a filter blurred the image.",
+        "Whether a drawing is what it was before a scan, a filter or resizing changed its edges.",
         **DRAWN,
     )
     seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)

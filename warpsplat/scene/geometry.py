@@ -89,7 +89,7 @@ def bounds(scene: Scene) -> FloatArray:
     return np.concatenate([low - pad, high + pad], axis=1)
 
 
-def enlarged(scene: Scene, factor: int, width: int, height: int) -> Scene:
+def enlarged(scene: Scene, factor: float, width: int, height: int) -> Scene:
     """Return a scene ``factor`` times as large, on a canvas of ``width`` x ``height`` units."""
     return replace(
         scene,
