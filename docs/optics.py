@@ -1,6 +1,6 @@
 """The picture of docs/scans.md: ``python docs/optics.py [FILE]``.
 
-A badge as a scanner and programs would have saved it, its drawing as it is, and that with what they did undone.
+A badge as a scanner and programs would have saved it, its drawing as it is, and with what they did undone.
 """
 
 from __future__ import annotations

@@ -154,7 +154,7 @@ def _is_ring(pixels: Floats, near: Floats, far: Floats, tolerance: float) -> Boo
 def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int]:
     """Return how many crossings say that colours were mixed in linear light, and how many in sRGB.
 
-    The area beside a straight edge changes evenly from row to row, in the light in which colours were mixed.
+    The area beside an edge changes evenly from row to row, in the light in which colours were mixed.
     """
     after = np.full((image.shape[0] + 2, image.shape[1] + 4), -1)
     after[found.rows + 1, found.before + 2] = np.arange(len(found.rows))
@@ -176,8 +176,11 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
         share, _ = mixed(pixels, one[found.owner], other[found.owner])
         place = found.before + np.bincount(found.owner, share, len(found.rows))
         known &= np.abs(place[beside[0]] - place[beside[1]]) > SLANT
-        bends.append(np.abs(place[beside[0]] - 2 * place + place[beside[1]]))
-    # A level more or less at each of the three places bends an edge, too.
+        bend = place[beside[0]] - 2 * place + place[beside[1]]
+        # That of a round edge is the same in the next row.
+        bends.append(np.abs(bend - bend[beside[1]]))
+    known &= known[beside[1]]
+    # A level more or less in any of the rows bends an edge, too.
     known &= np.maximum(*bends) * channel_max(np.abs(found.other - found.one)) > 2 * tolerance
     linear, gamma = (bend[known] for bend in bends)
     return int((linear < gamma).sum()), int((gamma < linear).sum())

@@ -28,6 +28,10 @@ LIKELY, CLEARLY = 0.9, 0.75
 """Share of the squared error without a kernel that one must leave less than for a trace through it to be
 tried, and for that to be kept, of files of one size: blurred pictures have .5 and less."""
 
+MOVED = 2.5
+"""Squared error that the first trace in linear light may leave, over that of one in sRGB, whose edges moved
+to where they explain the picture: the fit moves those of the right light, too."""
+
 
 class HasScene(Protocol):
     """A trace."""
@@ -76,12 +80,15 @@ def without_optics(
     if over():
         return best
     found, _ = look(first[1])
-    bound = _cost(found.without, first[1].scene) + 10 * float(log10(CLEARLY))
+    usual = _cost(found.without, first[1].scene)
+    bound = usual + 10 * float(log10(CLEARLY))
     if told:
         plain = seen.plain()
         traced = trace(plain)
         found, cost = look(traced)
         if seen.edges.is_linear:
+            if cost > usual + 10 * float(log10(MOVED)):
+                return first
             bound, best = cost, (plain, traced)
     for _ in range(TURNS):
         if over():
