@@ -16,5 +16,7 @@ The words of these modules:
 * node: where two curves of a path meet; joint: how they do.
 * price: the error that a byte is worth (``prices``).
 * glyph: a letter, or another small part, that is drawn once and placed several times.
+* optics: what made a picture of sharp shapes: the light in which colours were mixed, and a kernel
+  (``optics``).
 * ink: the colour of thin parts; pen: the colour and width of strokes.
 """
