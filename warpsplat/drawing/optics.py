@@ -131,7 +131,7 @@ class Seen:
         rings = _rings(fine if light is None else _levels(light), *some)
         steps = self._steps(fine, some)
         kernel, error = self._kernel(rings, steps, some)
-        through = self._seen(_summed(kernel, rings))
+        through = self.in_srgb(_summed(kernel, rings))
         without = _squared(self._planes(self.levels[some] - _rounded(mean[some])))
         undone, shown = self.levels.copy(), _rounded(mean)
         undone[some] = mean[some] + self._residual(through, steps, some)
@@ -140,7 +140,7 @@ class Seen:
 
     def _kernel(self, rings: list[Floats], steps: Floats, some: tuple[Ints, ...]) -> tuple[Kernel, float]:
         """Return the kernel for some pixels, and the squared error with it."""
-        light = self._planes(self._light(self.levels[some]))
+        light = self._planes(self.in_light(self.levels[some]))
         planes = [self._planes(ring) for ring in rings]
         center = planes[0] / COUNTS[0]
         columns = [ring - n * center for ring, n in zip(planes[1:], COUNTS[1:], strict=True)]
@@ -149,7 +149,7 @@ class Seen:
         weight = usual = np.repeat(np.where(self.edges.clean[some], CLEAN, 1), light.shape[1])
 
         def left(tried: Kernel) -> float:
-            return _squared(self._planes(self._residual(self._seen(_summed(tried, rings)), steps, some)))
+            return _squared(self._planes(self._residual(self.in_srgb(_summed(tried, rings)), steps, some)))
 
         kernel, error = NONE, left(NONE)
         told = int(((light > 0) & (light < 255)).sum())
@@ -184,7 +184,7 @@ class Seen:
             for change in (cv2.erode, cv2.dilate)
         )
         return np.where(
-            high > low, (high - low) / np.maximum(self._light(high) - self._light(low), 1 / 16), 1
+            high > low, (high - low) / np.maximum(self.in_light(high) - self.in_light(low), 1 / 16), 1
         )
 
     def _residual(self, through: Floats, steps: Floats, some: tuple[Ints, ...]) -> Floats:
@@ -192,13 +192,25 @@ class Seen:
 
         ``through``: what it becomes through the optics, shape (pixel, channel).
         """
-        return np.round(16 * (self._light(self.levels[some]) - self._light(through)) * steps) / 16
+        return np.round(16 * (self.in_light(self.levels[some]) - self.in_light(through)) * steps) / 16
 
-    def _light(self, levels: Floats) -> Floats:
+    @property
+    def near_edges(self) -> Bools:
+        """The pixels that a kernel may have changed, shape (height, width)."""
+        return dilated(self.uneven, 2 * RADIUS // SCALE)
+
+    def through(self, fine: FloatArray, kernel: Kernel, some: tuple[Ints, ...]) -> Floats:
+        """Return some pixels of a sharp image through a kernel, neither rounded nor clipped [levels].
+
+        ``fine``: in [0, 1], in the light in which colours were mixed, (SCALE height, SCALE width, channel).
+        """
+        return _summed(kernel, _rings(_levels(fine), *some))
+
+    def in_light(self, levels: Floats) -> Floats:
         """Return whole levels in the light in which colours were mixed."""
         return LINEAR[levels.astype(np.intp)] if self.edges.is_linear else levels
 
-    def _seen(self, light: Floats) -> Floats:
+    def in_srgb(self, light: Floats) -> Floats:
         """Return whole levels of such light."""
         if self.edges.is_linear:
             return np.searchsorted(MIDDLES, light).astype(np.float32)

@@ -18,6 +18,7 @@ from warpsplat.drawing.fit_outlines import OutlineFit, matching
 from warpsplat.drawing.nodes import apart, applied, candidates
 from warpsplat.drawing.optics import Seen
 from warpsplat.drawing.prices import LEAST_ERROR, worth
+from warpsplat.drawing.seen_colors import with_seen_colors
 from warpsplat.drawing.shapes import shape_changes
 from warpsplat.fit.problem import Run
 from warpsplat.metrics import decibels
@@ -121,13 +122,17 @@ def _through_optics(
     """Return a fit to what the optics leave of an image, and that, by what the fit shows."""
     if seen is None:
         return fit, target
-    picture = Seen.of(matching(seen, fit.drawing.scene.canvas))
+    picture, draw = Seen.of(matching(seen, fit.drawing.scene.canvas)), partial(render, backend=run.backend)
     for _ in range(TURNS):
         if run.over():
             break
         drawing = fit.drawing
-        scenes = picture.scenes(drawing.scene)
-        target = picture.find(*(render(scene, backend=run.backend) for scene in scenes)).undone
+        found = picture.find(*map(draw, picture.scenes(drawing.scene)))
+        scene = with_seen_colors(drawing.scene, picture, found.kernel, draw)
+        if (scene.colors != drawing.scene.colors).any():
+            drawing = replace(drawing, scene=scene)
+            found = picture.find(*map(draw, picture.scenes(scene)))
+        target = found.undone
         fit = OutlineFit(target, drawing, run)
         fit.advance(run, SECOND_STEPS)
     return fit, target
