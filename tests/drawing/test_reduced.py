@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFilter
 
 import warpsplat
 from tests.drawing.test_optics import BOX, SIDE, enlarged, pixels, psnr, small
@@ -64,3 +64,16 @@ def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
     )
     assert psnr(shown, pixels(enlarged(4))) > 38
     assert len(made.svg) < 800
+
+
+def test_edges_along_the_axes_are_no_sign_of_enlargement() -> None:
+    """A mixed pixel between flat ones lies alone between two of nearly any smaller image."""
+    image = np.full((90, 120, 3), 250, np.float32)
+    image[20:70, 30:80] = (40, 90, 160)
+    image[20:70, 29], image[20:70, 80], image[19, 30:80], image[70, 30:80] = 180, 100, 230, 130
+    assert before_enlarging(image) is None
+
+
+def test_what_is_smooth_was_of_any_size() -> None:
+    soft = small(BOX).filter(ImageFilter.GaussianBlur(2.5))
+    assert before_enlarging(levels(soft)) is None

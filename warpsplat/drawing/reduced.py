@@ -16,6 +16,13 @@ ROUNDING = 0.45
 """Root of the mean squared difference from an enlarged image, at the most [levels]: rounding leaves .3."""
 
 
+MOST_FITTING = 3
+"""Sizes that are left by these rows, at the most."""
+
+FARTHEST = 2.0
+"""How far a pixel of an enlarged image may be off [levels]: it was rounded along both sides."""
+
+
 def before_enlarging(image: Floats) -> Floats | None:
     """Return the image from which one was made by linear interpolation; None: there is none.
 
@@ -35,6 +42,9 @@ def before_enlarging(image: Floats) -> Floats | None:
     if rows is None:
         return None
     small = _solved(_solved(image, columns).swapaxes(0, 1), rows).swapaxes(0, 1)
+    again = _enlarged(_enlarged(small, width).swapaxes(0, 1), height).swapaxes(0, 1)
+    if np.abs(again - image).max() > FARTHEST:  # a few edges may lie as those of another size do
+        return None
     return np.ascontiguousarray(np.clip(np.round(small), 0, 255), np.float32)
 
 
@@ -71,8 +81,11 @@ def _best(image: Floats, sizes: Ints) -> int | None:
     known = right.reshape(total, -1)
     off = rest[..., None] * known[at] + share[..., None] * known[at + 1] - values
     errors = np.square(off).sum(axis=(1, 2)) / (values.shape[1] * (side - low[:, -1] - 2))
-    best = int(errors.argmin())
-    return int(sizes[best]) if errors[best] < ROUNDING * ROUNDING else None
+    fitting = np.flatnonzero(errors < ROUNDING * ROUNDING)
+    # Edges along the axes, and what is smooth, are as of any size.
+    if not 0 < len(fitting) <= MOST_FITTING:
+        return None
+    return int(sizes[errors.argmin()])
 
 
 def _tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
@@ -86,14 +99,26 @@ def _tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
         right[i] = (right[i] - beside[i][:, None] * right[i + 1]) / diagonal[i][:, None]
 
 
+def _places(columns: int, size: int) -> tuple[Ints, Floats]:
+    """Return between which of ``size`` columns each of more lies: the first, and the share of the second."""
+    place = np.clip((np.arange(columns) + 0.5) * size / columns - 0.5, 0, size - 1)
+    low = np.minimum(place.astype(np.intp), size - 2)
+    return low, place - low
+
+
+def _enlarged(image: Floats, columns: int) -> Floats:
+    """Return an image interpolated to so many columns."""
+    low, share = _places(columns, image.shape[1])
+    return image[:, low] * (1 - share)[:, None] + image[:, low + 1] * share[:, None]
+
+
 def _solved(image: Floats, size: int) -> Floats:
     """Return the image of ``size`` columns of which another one is the interpolation, by least squares."""
     columns = image.shape[1]
-    place = np.clip((np.arange(columns) + 0.5) * size / columns - 0.5, 0, size - 1)
-    low = np.minimum(place.astype(np.intp), size - 2)
-    share = (place - low)[:, None]
+    low, weights = _places(columns, size)
+    share = weights[:, None]
     values = np.moveaxis(image, 1, 0).reshape(columns, -1).astype(np.float64)
-    rest, weights = 1 - share, (place - low)
+    rest = 1 - share
     squares = np.square(1 - weights), np.square(weights)
     diagonal = np.asarray(
         np.bincount(low, squares[0], size) + np.bincount(low + 1, squares[1], size), np.float64
