@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.seeds import EDGE
 
 LEAST, MOST = 1.1, 4.0
 """Factors of enlargement that are looked for."""
 
 ROWS, LOOK = 4, 256
-"""Rows with most edges by which the factor is found, and how many pixels of each."""
+"""Rows by which the factor is found, and how many pixels of each."""
 
 ROUNDING = 0.45
 """Root of the mean squared difference from an enlarged image, at the most [levels]: rounding leaves .3."""
@@ -54,9 +55,10 @@ def _best(image: Floats, sizes: Ints) -> int | None:
     if not len(sizes):
         return None
     grey = image[..., :3].sum(axis=2)
-    edges = np.abs(np.diff(grey, axis=1))
-    rows = np.sort(np.argsort(-edges.sum(axis=1), kind="stable")[:ROWS])
-    counts = np.append(0, np.cumsum(edges[rows].sum(axis=0)))
+    rows = _independent_rows(grey / 3)
+    if rows is None:
+        return None
+    counts = np.append(0, np.cumsum(np.abs(np.diff(grey[rows], axis=1)).sum(axis=0)))
     side = min(LOOK, width)
     first = int((counts[side - 1 :] - counts[: len(counts) - side + 1]).argmax())
     values = grey[rows, first : first + side].T.astype(np.float64) / 3
@@ -86,6 +88,22 @@ def _best(image: Floats, sizes: Ints) -> int | None:
     if not 0 < len(fitting) <= MOST_FITTING:
         return None
     return int(sizes[errors.argmin()])
+
+
+def _independent_rows(image: Floats) -> list[int] | None:
+    """Return the rows whose bends tell most beside one another; None: all are mixtures of fewer.
+
+    Edges along the axes are alike in many rows, and lie as those of nearly any smaller image do.
+    """
+    bends, rows = np.diff(image, n=2, axis=1).astype(np.float64), list[int]()
+    for _ in range(ROWS):
+        sizes = np.square(bends).sum(axis=1)
+        rows.append(int(sizes.argmax()))
+        if sizes[rows[-1]] < EDGE * EDGE:
+            return None
+        own = bends[rows[-1]].copy()
+        bends -= (bends * own).sum(axis=1)[:, None] / sizes[rows[-1]] * own
+    return rows
 
 
 def _tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
