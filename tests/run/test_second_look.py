@@ -29,7 +29,7 @@ def soft_stroke() -> FloatArray:
     """Blurred beyond all edges: a drawing of it has a few steps."""
     image = np.ones((96, 96), np.float32)
     cv2.ellipse(image, (48, 48), (26, 20), 0, 0, 300, 0, 7)
-    return np.repeat(cv2.GaussianBlur(image, (0, 0), 8)[..., None], 3, axis=2).astype(np.float32)
+    return np.repeat(cv2.GaussianBlur(image, (0, 0), 5)[..., None], 3, axis=2).astype(np.float32)
 
 
 def problem(image: FloatArray, **given: Any) -> Problem:
