@@ -64,6 +64,14 @@ def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
     )
     assert psnr(shown, pixels(enlarged(4))) > 38
     assert len(made.svg) < 800
+    assert made.optics and made.optics.psnr > made.score.psnr  # type: ignore[union-attr]
+
+
+def test_without_optics_an_enlarged_image_is_drawn_as_it_is() -> None:
+    picture = pixels(small(BOX).resize((151, 150), Image.Resampling.BILINEAR))
+    assert (Picture.of(picture, is_soft=True).enlargement == 1).all()
+    made = warpsplat.vectorize(picture, subject="drawing", optics="none", quality="draft")
+    assert made.optics is None
 
 
 def test_edges_along_the_axes_are_no_sign_of_enlargement() -> None:

@@ -62,7 +62,7 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     """
     settings, limit = problem.settings, problem.settings.max_bytes
     most = None if settings.simplify else settings.curves
-    picture, price = Picture.of(problem.target), byte_price(settings)
+    picture, price = Picture.of(problem.target, is_soft=settings.optics == "none"), byte_price(settings)
     announce_trace(picture, settings)
     picture, found = _sharp(picture, settings, run, most)
     if not run.over():
@@ -179,7 +179,8 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
 
         scene = with_strokes(scene, settings, run)
     psnr = done.psnr - 10 * float(elementary.log10(picture.share))
-    grid, is_sharper = done.per_pixel / float(picture.enlargement.mean()), picture.seen is not None
+    grid = done.per_pixel / float(picture.enlargement.mean())
+    is_sharper = picture.is_interpolated or picture.seen is not None
     return Fit(scene, grid, psnr, psnr, 0, run.stopped(), is_sharper=is_sharper)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max
 from warpsplat.drawing.trace.mixtures import MIXED, mixed
 from warpsplat.drawing.trace.seeds import EDGE, ROUNDING
-from warpsplat.portable import elementary
+from warpsplat.portable import filters
 from warpsplat.scene.scene import ranges
 
 FLAT = 3
@@ -27,18 +27,11 @@ SURE = 3.0
 SLANT = 0.06
 """How far an edge moves within two rows, to tell in which light it was mixed [px]."""
 
-SHADES = np.arange(256) / 255
-LINEAR = (
-    np.round(
-        16
-        * 255
-        * np.where(SHADES <= 0.04045, SHADES / 12.92, elementary.power((SHADES + 0.055) / 1.055, 2.4))
-    )
-    / 16
-).astype(np.float32)
-"""The linear light of each level of sRGB, in sixteenths of levels, so that sums are exact (IEC 61966-2-1)."""
+LINEAR = (np.round(16 * 255 * filters.linear_light(np.arange(256) / 255)) / 16).astype(np.float32)
+"""The linear light of each level of sRGB, in sixteenths of levels, so that sums are exact."""
 
 MIDDLES = (LINEAR[1:] + LINEAR[:-1]) / 2
+"""Where one level of sRGB ends and the next begins, in linear light."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,13 +45,20 @@ class Picture:
 
     seen: FloatArray | None = None
     """The pixels before they were made sharp, if they were."""
+    is_interpolated: bool = False
+    """Whether the image was enlarged by interpolation, which is undone."""
 
     @classmethod
-    def of(cls, image: FloatArray) -> Picture:
-        """Return the picture of an image."""
+    def of(cls, image: FloatArray, *, is_soft: bool = False) -> Picture:
+        """Return the picture of an image.
+
+        ``is_soft``: leave what interpolation made of it.
+        """
         factor = _enlargement(image)
-        small = before_enlarging(np.round(image * np.float32(255))) if factor == 1 else None
-        small = np.ascontiguousarray(image[::factor, ::factor]) if small is None else small / np.float32(255)
+        before = None if is_soft or factor > 1 else before_enlarging(np.round(image * np.float32(255)))
+        is_interpolated = before is not None
+        repeated = np.ascontiguousarray(image[::factor, ::factor])
+        small = repeated if before is None else before / np.float32(255)
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
         pixels, noise = without_noise(small)
         size, thin = np.array(pixels.shape[1::-1]), np.array(margins(pixels, THIN_SIDE))
@@ -61,7 +68,8 @@ class Picture:
         widths = [((low - first)[axis], (last - high)[axis]) for axis in (1, 0)]
         wide = np.pad(pixels[low[1] : high[1], low[0] : high[0]], [*widths, (0, 0)], mode="edge")
         drawn = size if box is None else box[1] - box[0]
-        return cls(np.ascontiguousarray(wide), noise, enlargement, first, size, drawn, bool(thin.any()))
+        pixels, is_thin = np.ascontiguousarray(wide), bool(thin.any())
+        return cls(pixels, noise, enlargement, first, size, drawn, is_thin, is_interpolated=is_interpolated)
 
     @property
     def share(self) -> float:

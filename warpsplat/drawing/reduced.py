@@ -16,9 +16,8 @@ ROWS, LOOK = 4, 256
 ROUNDING = 0.45
 """Root of the mean squared difference from an enlarged image, at the most [levels]: rounding leaves .3."""
 
-
 MOST_FITTING = 3
-"""Sizes that are left by these rows, at the most."""
+"""Sizes that may explain the rows: of more, none is sure."""
 
 FARTHEST = 2.0
 """How far a pixel of an enlarged image may be off [levels]: it was rounded along both sides."""

@@ -19,7 +19,7 @@ from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.sizes import estimated_size
 
 TURNS = 6
-"""Traces from which it is found, at the most."""
+"""Traces of a picture without its optics, at the most."""
 
 LOOK = 128
 """Side of the part of a picture that is looked at first [px]."""

@@ -374,13 +374,17 @@ def grey(rgb: Floats) -> Floats:
     return np.asarray(red + green + blue)
 
 
+def linear_light(rgb: Floats) -> Floats:
+    """Return sRGB values in [0, 1] as linear light in float64 (IEC 61966-2-1)."""
+    colors = np.asarray(rgb, np.float64)
+    bent = elementary.power((np.maximum(colors, 0.04045) + 0.055) / 1.055, 2.4)
+    return np.asarray(np.where(colors <= 0.04045, colors / 12.92, bent))
+
+
 def lab(rgb: Floats) -> Floats:
     """Return colours (..., 3), sRGB in [0, 1], as CIELAB: lightness in [0, 100], a and b."""
     given = _floats(rgb)
-    colors = np.asarray(given, np.float64)
-    bent = elementary.power((np.maximum(colors, 0.04045) + 0.055) / 1.055, 2.4)
-    linear = np.where(colors <= 0.04045, colors / 12.92, bent)
-    cubes = []
+    linear, cubes = linear_light(given), []
     for row, white in zip(XYZ, WHITE, strict=True):
         share = (row[0] * linear[..., 0] + row[1] * linear[..., 1] + row[2] * linear[..., 2]) / white
         root = elementary.power(np.maximum(share, 0.008856), 1 / 3)
