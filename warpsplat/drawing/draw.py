@@ -25,6 +25,8 @@ from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.simple import simple
+from warpsplat.svg.write import rounded
 
 SECONDS_PER_PIXEL, SECONDS_PER_NODE = 4e-6, 5.5e-4
 """Rough time of tracing a pixel, and of fitting a node, on one core [s]."""
@@ -180,6 +182,7 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
         scene = with_strokes(scene, settings, run)
     psnr = done.psnr - 10 * float(elementary.log10(picture.share))
     grid = done.per_pixel / float(picture.enlargement.mean())
+    scene = simple(rounded(scene, grid), grid)
     is_sharper = picture.is_interpolated or picture.seen is not None
     return Fit(scene, grid, psnr, psnr, 0, run.stopped(), is_sharper=is_sharper)
 

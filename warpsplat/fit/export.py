@@ -10,15 +10,18 @@ from PIL import Image
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.connected import separated
+from warpsplat.scene.cutout import cut_out
+from warpsplat.scene.simple import simple
 from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
-from warpsplat.svg.write import minified, shortened, write_svg
+from warpsplat.svg.write import minified, rounded, shortened, write_svg
 
 
 def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:
     """Return the SVG of ``scene``, with ``per_pixel`` units of its view box per pixel."""
     renderer = renderer_of(settings.renderer)
     return write_svg(
-        renderer.to_paths(scene, settings),
+        for_machines(renderer.to_paths(scene, settings), settings, per_pixel),
         per_pixel=per_pixel,
         metadata=metadata,
         opacity_scale=renderer.opacity_scale,
@@ -26,6 +29,18 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
         ids=settings.ids,
         symbols=settings.symbols,
     )
+
+
+def for_machines(scene: Scene, settings: Settings, per_pixel: float) -> Scene:
+    """Return a scene with contours that machines accept, as far as the settings ask for them."""
+    changes = (
+        (simple, settings.simple),
+        (cut_out, settings.stack == "cutout"),
+        (separated, settings.separate),
+    )
+    for change, is_wanted in changes:
+        scene = change(rounded(scene, per_pixel), per_pixel) if is_wanted else scene
+    return scene
 
 
 def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "") -> str:

@@ -36,6 +36,7 @@ Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 OpticsChoice = Literal["auto", "none"]
+Stack = Literal["overlap", "cutout"]
 LossName = Literal["l2", "ssim", "edges"]
 
 SUBJECTS = {
@@ -320,6 +321,15 @@ class Settings:
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
+    simple: bool = option(
+        False, "Outlines of fills that do not cross themselves; those of drawings never do.", refine=True
+    )
+    separate: bool = option(False, "A path for each connected part of a colour, with its holes.", refine=True)
+    stack: Stack = option(
+        "overlap",
+        "Whether shapes lie on one another, or each is cut where others cover it; cutout makes all opaque.",
+        refine=True,
+    )
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
@@ -448,7 +458,7 @@ class Settings:
             is_given = value != each.default and not by_quality
             if each.subjects and subject not in each.subjects and is_given:
                 found.append(Given(self._called(each), each))
-        if self.is_limited:  # implies it
+        if self.is_limited or self.stack == "cutout":  # implies it
             found = [given for given in found if given.option.field != "opaque"]
         changed = [each for each in options_of(Settings) if each.field in OF_PRESETS & {*PRESETS[quality]}]
         if changed and not any(subject in each.subjects for each in changed):
@@ -558,6 +568,8 @@ def expand(given: dict[str, Any]) -> None:
     if given.get("levels"):  # the last of them is the whole
         given.setdefault("curves", given["levels"][-1])
     if given.get("colors") or given.get("palette"):  # what shines through would make further colours
+        given["opaque"] = True
+    if given.get("stack") == "cutout":  # what is below shows through no more
         given["opaque"] = True
 
 

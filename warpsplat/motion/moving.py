@@ -282,11 +282,11 @@ def _path_data(points: FloatArray, form: PathForm) -> str:
     grid = [(x, y) for x, y in np.round(points / 2 if spline else points).astype(np.int64).tolist()]
     closed = bool(form.closed)
     text = relative_smooth(*spline_joints(grid, closed)) if spline else _relative_cubics(grid, closed)
-    return f"{text}z" if form.closed and form.kind == Kind.STROKE else text
+    return f"{text}z" if closed else text
 
 
 def _relative_cubics(grid: list[Pair], closed: bool) -> str:
-    """Return relative cubics; rings are not closed."""
+    """Return relative cubics, without the command that closes a ring."""
     chain = [*grid, grid[0]] if closed else grid
     steps = [minus(point, chain[i // 3 * 3]) for i, point in enumerate(chain[1:])]
     return f"M{integers(grid[:1])}c{integers(steps)}"

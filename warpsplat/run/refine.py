@@ -15,7 +15,7 @@ from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
-from warpsplat.fit.export import show
+from warpsplat.fit.export import for_machines, show
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.objective import loss_of_file
 from warpsplat.fit.problem import Problem, Run
@@ -147,9 +147,9 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     if checkpoint and made.interrupted:
         checkpoint.save()
     release_memory()
-    svg = write_svg(
-        refined, per_pixel=made.per_pixel, background=has_background, title=settings.title, ids=settings.ids
-    )
+    bare = refined if has_background else replace(refined, canvas=replace(refined.canvas, background=None))
+    shown = for_machines(bare, settings, made.per_pixel)
+    svg = write_svg(shown, per_pixel=made.per_pixel, title=settings.title, ids=settings.ids)
     svg = minified(svg) if settings.minify else svg if view else shortened(svg)
     perceptual = has_time_for_ssimulacra2(settings, target) and not made.interrupted
     score = score_svg(svg, target, own=not scene.pictures, perceptual=perceptual)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Subject
+from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Stack, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -17,6 +17,9 @@ class RefineOptions(TypedDict, total=False):
     background: str | None
     title: str | None
     ids: bool | None
+    simple: bool | None
+    separate: bool | None
+    stack: Stack | None
     minify: bool | None
     precision: int | None
 

@@ -134,9 +134,9 @@ STARTS = 4
 
 
 def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]:
-    """Return path data of a ring that a fill closes, from its best start, and where its last command ends.
+    """Return path data of a ring, from its best start, and that start, where the pen is then.
 
-    A line that comes last need not be written.
+    A line that comes last need not be written: the command that closes the ring draws it.
     """
     behind = [segments[-1], *segments[:-1]]
     commands = list(map(_commands, segments, (before.mirrored() for before in behind)))
@@ -152,15 +152,13 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
         is_same = segments[i].handles is None or behind[i].mirrored() == start
         first = commands[i] if is_same else _commands(segments[i], start)
         rotated = [first, *commands[i + 1 :], *commands[:i]]
-        last = i - 1
         if behind[i].handles is None and len(rotated) > 1:
             rotated.pop()
-            last -= 1
-        found.append((_shortest(pen, start, rotated), segments[last].end))
+        found.append((f"{_shortest(pen, start, rotated)}z", start))
     return min(found, key=lambda one: len(one[0]))
 
 
-MOVE = re.compile(r"([Mm])(-?\d+) ?(-?\d+)")
+MOVED = re.compile(r"([Mm])(-?\d+) ?(-?\d+)")
 
 
 class Rings:
@@ -168,28 +166,26 @@ class Rings:
 
     def __init__(self) -> None:
         """Begin without any."""
-        self._known: dict[tuple[Segment, ...], tuple[Pair, str, Pair]] = {}
-        """Where the text of a ring begins, from the first segment; it without the move; where it ends."""
+        self._known: dict[tuple[Segment, ...], tuple[Pair, str]] = {}
+        """Where the text of a ring begins, from the first segment, and it without the move."""
 
     def data(self, pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]:
-        """Return path data of a ring, and where its last command ends, as ``shortest_ring``."""
+        """Return path data of a ring, and where the pen is then, as ``shortest_ring``."""
         origin = segments[0].start
         key = tuple(_moved(segment, origin) for segment in segments)
         if key in self._known:
-            first, drawn, last = self._known[key]
+            first, drawn = self._known[key]
             start = plus(first, origin)
             moves = [f"m{row(minus(start, pen or (0, 0)), False)}", f"M{row(start, False)}"]
             # Behind a relative move, lines need no letter.
             move = min(moves, key=len) if drawn[:1].isalpha() else moves[0]
-            return move + drawn, plus(last, origin)
-        text, end = shortest_ring(pen, segments)
-        if found := MOVE.match(text):
-            letter, x, y = found.groups()
+            return move + drawn, start
+        text, start = shortest_ring(pen, segments)
+        if found := MOVED.match(text):
             drawn = text[found.end() :]
-            if drawn.islower() and (letter == "m" or drawn[0].isalpha()):
-                start = plus((int(x), int(y)), (pen or (0, 0)) if letter == "m" else (0, 0))
-                self._known[key] = minus(start, origin), drawn, minus(end, origin)
-        return text, end
+            if drawn.islower() and (found[1] == "m" or drawn[0].isalpha()):
+                self._known[key] = minus(start, origin), drawn
+        return text, start
 
 
 def _moved(segment: Segment, origin: Pair) -> Segment:

@@ -102,7 +102,7 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
     starts, closed = scene.starts.tolist(), scene.closed.astype(np.bool_).tolist()
     contours = np.searchsorted(scene.starts, scene.first).tolist()
     strokes = scene.kind == Kind.STROKE
-    # A fill closes its contours, a stroke does not, and its dashes depend on the start.
+    # A stroke's dashes depend on where it starts.
     arcs = {i: made.rounded() for i, made in primitives(scene, exact) if made.radii[0] > 0}
     rings = Rings()
     stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
@@ -113,7 +113,7 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
             rows = slice(*starts[contour : contour + 2])
             if is_spline:
                 texts.append(spline_data(grid[rows], closed[contour], may_rotate=not stroked[shape]))
-                texts.append("z" if closed[contour] and stroked[shape] else "")
+                texts.append("z" if closed[contour] else "")
                 continue
             made = None if stroked[shape] else arcs.get(contour)
             if made:
@@ -146,10 +146,10 @@ def cubic_data(
     """
     if not segments:
         return f"M{integers([start])}z", start
-    if closed and rings:
-        return rings.data(pen, segments)
     if not closed:
         return shortest(pen, segments), segments[-1].end
+    if rings:
+        return rings.data(pen, segments)
     if segments[-1].handles is None and len(segments) > 1:
         segments.pop()
     return f"{shortest(pen, segments)}z", start

@@ -105,7 +105,7 @@ class Primitive:
                 letter, numbers = ("v", [y]) if x == 0 else ("h", [x])
             text += row(numbers, True) if letter == last else letter + row(numbers, False)
             last = letter
-        return text, start
+        return f"{text}z", start
 
 
 def cubics_of(made: Sequence[Primitive]) -> list[Floats]:

@@ -13,8 +13,9 @@ from warpsplat.svg.primitives import primitives
 
 Floats = npt.NDArray[np.float64]
 
-HEAD, PATH, MOVE = 130, 32, 1
-"""Characters of the file's beginning and end, of a path but for its data, and of a move's letter."""
+HEAD, PATH, MOVE = 130, 32, 2
+"""Characters of the file's beginning and end, of a path but for its data, and the letters of a contour's
+move and end."""
 
 USE, GRADIENT = 34, 185
 """Bytes of a ``use`` element, and of a gradient of two stops with the reference to it."""

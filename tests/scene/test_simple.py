@@ -1,0 +1,160 @@
+"""Tests of contours that do not cross, of parts, and of drawings without overlaps."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from warpsplat.run.svg import load_svg
+from warpsplat.scene import Kind, Rule, Scene
+from warpsplat.scene.attributes import Basis
+from warpsplat.scene.connected import separated
+from warpsplat.scene.cutout import cut_out
+from warpsplat.scene.intersections import intersections, parts
+from warpsplat.scene.simple import PAINTED, area, bounding, polygon, rings_of, simple, simple_rings
+from warpsplat.svg.viewer import render_svg
+from warpsplat.svg.write import write_svg
+
+SIDE = 64
+
+
+def scene_of(*paths: str) -> Scene:
+    """Return a scene of path elements without their brackets."""
+    elements = "".join(f"<path {path}/>" for path in paths)
+    return load_svg(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIDE} {SIDE}">{elements}</svg>')
+
+
+def random_path(seed: int, count: int = 7) -> str:
+    """Return a ring of cubics and lines between random points on a grid of half pixels."""
+    points = np.random.default_rng(seed).integers(4, 2 * SIDE - 4, (count, 3, 2)) / 2
+    pieces = [
+        f"L{c[0]} {c[1]}" if i % 3 == 0 else f"C{a[0]} {a[1]} {b[0]} {b[1]} {c[0]} {c[1]}"
+        for i, (a, b, c) in enumerate(points.tolist())
+    ]
+    return f"M{points[-1, 2, 0]} {points[-1, 2, 1]}{''.join(pieces)}z"
+
+
+def pixels(scene: Scene) -> np.ndarray:
+    """Return a scene as a viewer shows it, premultiplied, in [0, 1]."""
+    drawn = render_svg(write_svg(scene, per_pixel=16))
+    values = np.asarray(drawn.convert("RGBA"), np.float64) / 255
+    values[..., :3] *= values[..., 3:]
+    return values
+
+
+def crossings(scene: Scene) -> int:
+    """Return how often contours of the same shape cross, but for hairs: less than a unit off a node."""
+    found = 0
+    for shape in range(len(scene)):
+        cubics = np.concatenate(rings_of(scene, shape, 16))
+        pairs, places = intersections(cubics)
+        at = parts(cubics[pairs[:, 0]], places[:, 0], places[:, 0])[:, 0]
+        found += int((np.abs(at[:, None] - cubics[:, 0]).max(axis=2).min(axis=1, initial=np.inf) > 1).sum())
+    return found
+
+
+@pytest.mark.parametrize("rule", ["nonzero", "evenodd"])
+@pytest.mark.parametrize("seed", range(6))
+def test_what_crosses_is_cut_and_looks_the_same(seed: int, rule: str) -> None:
+    scene = scene_of(f'd="{random_path(seed)}{random_path(seed + 100)}" fill-rule="{rule}"')
+    assert crossings(scene) > 0
+    made = simple(scene, 16)
+    assert crossings(made) == 0
+    assert np.abs(pixels(made) - pixels(scene)).max() < 0.3
+    assert np.abs(pixels(made) - pixels(scene)).mean() < 0.001
+
+
+def test_what_does_not_cross_stays() -> None:
+    scene = scene_of('d="M9 9h40v40h-40zM19 19v20h20v-20z"', f'd="{random_path(3)}" fill="none" stroke="red"')
+    assert simple(scene, 16) is scene
+
+
+def test_a_loop_goes_and_a_bow_becomes_two_rings() -> None:
+    curl = simple(scene_of('d="M10 10H50V50H30V49H31V51H29V50H10z"'), 16)
+    bow = simple(scene_of('d="M10 10L50 50V10L10 50z"'), 16)
+    assert [len(one.contours_of(0)) for one in (curl, bow)] == [1, 2]
+    nodes = {tuple(point) for contour, _ in bow.contours_of(0) for point in contour[::3].tolist()}
+    assert nodes == {(10, 10), (30, 30), (10, 50), (50, 50), (50, 10)}
+
+
+def test_a_ring_that_touches_itself_is_two() -> None:
+    made = simple(scene_of('d="M10 10L30 30L50 10V50L30 30L10 50z"'), 16)
+    assert len(made.contours_of(0)) == 2
+
+
+def test_a_cubic_crosses_itself_once() -> None:
+    cubic = np.array([[(0, 0), (40, 30), (-10, 30), (30, 0)]], np.float64)
+    pairs, places = intersections(cubic)
+    assert pairs.tolist() == [[0, 0]]
+    assert np.isclose(places.sum(), 1)
+
+
+def test_cubics_cross_where_they_do() -> None:
+    """Found by brute force as well."""
+    rng = np.random.default_rng(5)
+    cubics = rng.uniform(0, 100, (12, 4, 2))
+    pairs, places = intersections(cubics)
+    found = set(map(tuple, np.sort(pairs, axis=1).tolist()))
+
+    def at(index: int, t: float) -> np.ndarray:
+        s = 1 - t
+        return np.array([s**3, 3 * s * s * t, 3 * s * t * t, t**3]) @ cubics[index]
+
+    for (i, j), (t, u) in zip(pairs.tolist(), places.tolist(), strict=True):
+        assert np.abs(at(i, t) - at(j, u)).max() < 0.05
+    dense = [np.stack([at(i, t) for t in np.linspace(0, 1, 400)]) for i in range(len(cubics))]
+    for i, j in itertools.combinations(range(len(cubics)), 2):
+        apart = np.abs(dense[i][:, None] - dense[j]).max(axis=2).min()
+        assert apart < 1 or (i, j) not in found
+        assert apart > 0.01 or (i, j) in found
+
+
+def test_parts_have_their_holes() -> None:
+    rings = "M4 4h20v20h-20zM34 4h20v20h-20zM8 8v12h12v-12zM10 10h4v4h-4zM38 8v12h12v-12z"
+    scene = scene_of(f'd="{rings}" fill="red"', 'd="M2 40h9v9h-9z" fill="blue"')
+    made = separated(scene, 16)
+    assert [len(made.contours_of(i)) for i in range(len(made))] == [2, 2, 1, 1]
+    assert made.colors[:3].tolist() == [[1, 0, 0]] * 3
+    np.testing.assert_array_equal(pixels(made), pixels(scene))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_lies_under_anything(seed: int) -> None:
+    colors = ("#f00", "#0a0", "#00f", "#cc0")
+    scene = scene_of(*(f'd="{random_path(10 * seed + i)}" fill="{c}"' for i, c in enumerate(colors)))
+    made = cut_out(scene, 16)
+    assert crossings(made) == 0
+    # Seams between what is cut let the ground through; nothing else changes.
+    assert np.abs(pixels(made) - pixels(scene)).mean() < 0.02
+    alone = [pixels(made.take(np.array([i])))[..., 3] for i in range(len(made))]
+    over = np.maximum(np.sum(alone, axis=0) - 1, 0)  # up to rounding
+    assert over.max() < 0.25
+    assert over.mean() < 0.001
+
+
+def test_edges_that_coincide_are_shared() -> None:
+    """A square over half of another one, and one beside it, with borders in common."""
+    scene = scene_of('d="M10 10h40v40h-40z" fill="red"', 'd="M10 10h20v40h-20z" fill="blue"')
+    made = cut_out(scene, 16)
+    (left, _), (right, _) = made.contours_of(1)[0], made.contours_of(0)[0]
+    corners = [sorted(map(tuple, contour[::3].round(3).tolist())) for contour in (left, right)]
+    assert corners[0] == [(10, 10), (10, 50), (30, 10), (30, 50)]
+    assert corners[1] == [(30, 10), (30, 50), (50, 10), (50, 50)]
+
+
+def test_what_is_covered_is_left_out_and_translucent_shapes_hide_nothing() -> None:
+    below, above = 'd="M20 20h9v9h-9z" fill="red"', 'd="M10 10h40v40h-40z" fill="blue"'
+    assert len(cut_out(scene_of(below, above), 16)) == 1
+    assert len(cut_out(scene_of(below, f'{above} fill-opacity=".5"'), 16)) == 2
+
+
+def test_the_rings_of_a_shape_run_around_its_paint() -> None:
+    scene = scene_of('d="M10 10V50H50V10zM20 20V40H40V20z" fill-rule="evenodd"')
+    rings = rings_of(scene, 0, 16)
+    painted = PAINTED[Rule.EVENODD]
+    made = bounding(simple_rings(rings, painted, 0), [], painted, 0)
+    assert [area(polygon(ring)) > 0 for ring in made] == [True, False]
+    assert scene.kind[0] == Kind.FILL
+    assert scene.basis[0] == Basis.CUBIC

@@ -1,0 +1,56 @@
+"""Fills as one shape for each connected part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpsplat.scene.attributes import Rule
+from warpsplat.scene.scene import Scene
+from warpsplat.scene.simple import (
+    LEAST,
+    PAINTED,
+    Floats,
+    area,
+    bounding,
+    free_fills,
+    polygon,
+    rings_of,
+    simple_rings,
+    turns,
+    with_rings,
+)
+
+
+def separated(scene: Scene, per_pixel: float) -> Scene:
+    """Return a scene that looks the same with a shape for each connected part of a fill, its holes with it.
+
+    Contours are made simple as by ``simple``, on the same grid. Shapes that are filled and stroked, and those
+    of a form, stay.
+    """
+    made: dict[int, list[Floats]] = {}
+    rows: list[int] = []
+    free = set(free_fills(scene))
+    for shape in range(len(scene)):
+        if shape not in free:
+            rows.append(shape)
+            continue
+        painted = PAINTED[Rule(scene.rule[shape])]
+        rings = simple_rings(rings_of(scene, shape, per_pixel), painted, LEAST * per_pixel * per_pixel)
+        for part in parts_of(bounding(rings, [], painted, 0.0)):
+            made[len(rows)] = part
+            rows.append(shape)
+    return with_rings(scene.take(np.array(rows, np.intp)), made, per_pixel)
+
+
+def parts_of(rings: list[Floats]) -> list[list[Floats]]:
+    """Return simple rings by connected parts: an outer one, which runs clockwise, and the holes in it."""
+    lines = [polygon(ring) for ring in rings]
+    areas = [area(line) for line in lines]
+    outer = [i for i in range(len(rings)) if areas[i] > 0]
+    parts = {i: [rings[i]] for i in outer}
+    for hole in sorted(set(range(len(rings))) - set(outer)):
+        # A hole may touch what is around it, in a point.
+        around = [i for i in outer if 2 * int((turns(lines[i], lines[hole]) > 0).sum()) > len(lines[hole])]
+        if around:
+            parts[min(around, key=areas.__getitem__)].append(rings[hole])
+    return list(parts.values())

@@ -1,0 +1,260 @@
+"""Fills whose contours cross neither themselves nor one another.
+
+Where two pieces of a shape's contours cross, both are cut, and each goes on along the other: that makes rings
+that meet but do not cross, and wind around every place as often as before (Seifert circles). Those with paint
+on both sides, or on neither, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from warpsplat.scene.attributes import Basis, Kind, Rule
+from warpsplat.scene.geometry import beziers
+from warpsplat.scene.intersections import flattened, intersections, parts
+from warpsplat.scene.scene import FloatArray, IndexArray, Scene, starts_of
+
+Floats = npt.NDArray[np.float64]
+
+ROUNDS = 8
+"""Times that a shape is made simple and rounded: rounding may make contours cross again, by a hair."""
+
+LEAST = 0.1
+"""Area [px²] of rings that are left out where contours are cut: nobody sees them."""
+
+PIECES, SAMPLES = 8, 9
+"""Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
+
+
+Painted = Callable[[IndexArray], npt.NDArray[np.bool_]]
+"""Whether there is paint, by how often contours wind around a place."""
+
+PAINTED: dict[Rule, Painted] = {
+    Rule.NONZERO: lambda turns: turns != 0,
+    Rule.EVENODD: lambda turns: turns % 2 == 1,
+}
+
+
+def simple(scene: Scene, per_pixel: float) -> Scene:
+    """Return a scene whose fills look the same, but have contours that do not cross.
+
+    Those of shapes that change are cubics, rounded to the grid of a file with ``per_pixel`` units to a pixel,
+    as those of the scene should be. Shapes that are filled and stroked, and those of a form, stay.
+    """
+    least, made = LEAST * per_pixel * per_pixel, {}
+    for shape in free_fills(scene):
+        rings = rings_of(scene, shape, per_pixel)
+        changed = simple_rings(rings, PAINTED[Rule(scene.rule[shape])], least)
+        if changed is not rings:
+            made[shape] = changed
+    return with_rings(scene, made, per_pixel) if made else scene
+
+
+def free_fills(scene: Scene) -> list[int]:
+    """Return the fills of cubics or splines that are not stroked as well."""
+    stroked = (scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
+    free = (scene.basis == Basis.CUBIC) | (scene.basis == Basis.SPLINE)
+    return np.flatnonzero((scene.kind == Kind.FILL) & free & ~stroked).tolist()
+
+
+def rings_of(scene: Scene, shape: int, per_pixel: float) -> list[Floats]:
+    """Return the contours of a fill as cubics, shape (cubic, 4, 2), in a file's units."""
+    basis = Basis(scene.basis[shape])
+    found = []
+    for points, _ in scene.contours_of(shape):
+        ring = per_pixel * beziers(points[None], True, basis)[0].astype(np.float64)
+        ring[:, ::3] = np.round(ring[:, ::3])  # exactly, as single precision is not
+        found.append(ring)
+    return found
+
+
+def with_rings(scene: Scene, made: dict[int, list[Floats]], per_pixel: float) -> Scene:
+    """Return a scene in which some shapes have other contours, as ``rings_of``; those without any go."""
+    points: list[FloatArray] = []
+    closed: list[bool] = []
+    counts = []
+    for shape in range(len(scene)):
+        own = scene.contours_of(shape)
+        if shape in made:
+            rings = ((ring[:, :3].reshape(-1, 2) / per_pixel).astype(np.float32) for ring in made[shape])
+            own = [(ring, True) for ring in rings]
+        points += [contour for contour, _ in own]
+        closed += [is_closed for _, is_closed in own]
+        counts.append(len(own))
+    starts = starts_of(np.array([len(contour) for contour in points], np.intp))
+    basis = scene.basis.copy()
+    basis[list(made)] = Basis.CUBIC
+    left = np.flatnonzero(counts)
+    return replace(
+        scene.take(left),
+        basis=basis[left],
+        points=np.concatenate(points) if points else np.zeros((0, 2), np.float32),
+        starts=starts,
+        closed=np.array(closed, np.int32),
+        first=starts[starts_of(np.array(counts, np.intp)[left])],
+    )
+
+
+def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
+    """Return rings of cubics that do not cross and fill the same; the same list if these do not.
+
+    New ends are whole numbers. New rings with an area below ``least`` are left out. Paint is to the right of
+    a ring on a screen: outer ones run clockwise.
+
+    Args:
+        rings: Of one shape, each of shape (cubic, 4, 2), in units; or (cubic, 4, 4), where the last two are
+            other coordinates, near the first two, by which is told what crosses.
+        painted: Where there is paint.
+        least: Area [units²].
+    """
+    for _ in range(ROUNDS):
+        cut = _uncrossed(rings)
+        if cut is None:
+            break
+        rings = [ring[..., :2] for ring in bounding(*cut, painted, least)]
+    return rings
+
+
+def _uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]] | None:
+    """Return the rings without crossings and repeated nodes, and what others become; None: there are none."""
+    if not rings:
+        return None
+    cubics, counts = np.concatenate(rings), np.array([len(ring) for ring in rings])
+    first, owner = starts_of(counts), np.repeat(np.arange(len(rings)), counts)
+    following = np.arange(1, len(cubics) + 1)
+    following[first[1:] - 1] = first[:-1]
+    pairs, places = intersections(cubics[..., -2:])
+    crossed = np.isin(np.arange(len(rings)), owner[pairs])
+    touching = np.array([len(set(map(tuple, ring[:, 0, :2].tolist()))) < len(ring) for ring in rings])
+    if not (crossed | touching).any():
+        return None
+    new = [ring for ring, is_new in zip(rings, touching & ~crossed, strict=True) if is_new]
+    if len(pairs):
+        new += _joined(cubics, following, owner, pairs, places)
+    kept = [ring for ring, is_new in zip(rings, crossed | touching, strict=True) if not is_new]
+    return kept, [part for ring in new for part in _apart(ring)]
+
+
+def _joined(
+    cubics: Floats, following: IndexArray, owner: IndexArray, pairs: IndexArray, places: Floats
+) -> Iterator[Floats]:
+    """Yield the rings that cubics make which are cut where ``pairs`` cross, each going on along the other."""
+    ends = np.round(parts(cubics[pairs[:, 0]], places[:, 0], places[:, 0])[:, 0, :2])
+    # Visits of the same crossing are neighbours: 0 and 1, 2 and 3 ...
+    cubic, t, end = pairs.reshape(-1), places.reshape(-1), np.repeat(ends, 2, axis=0)
+    order = np.lexsort((t, cubic))
+    begins = np.flatnonzero(np.diff(owner[cubic[order]], prepend=-1))
+    arriving = np.arange(1, len(order) + 1)
+    arriving[np.append(begins[1:], len(order)) - 1] = begins
+    after, rank = np.empty_like(order), np.empty_like(order)
+    after[order], rank[order] = order[arriving], np.arange(len(order))
+
+    def arc(visit: int) -> list[Floats]:
+        """Return the pieces from a crossing to the next one along its ring."""
+        goal = int(after[visit])
+        (a, b), (s, e) = cubic[[visit, goal]].tolist(), t[[visit, goal]].tolist()
+        pieces = []
+        if a == b and rank[visit] < rank[goal]:
+            pieces.append(_part(cubics[a], s, e))
+        else:
+            pieces.append(_part(cubics[a], s, 1))
+            a = int(following[a])
+            while a != b:
+                pieces.append(cubics[a])
+                a = int(following[a])
+            pieces.append(_part(cubics[b], 0, e))
+        pieces[0] = _held(pieces[0], 0, end[visit])
+        pieces[-1] = _held(pieces[-1], 3, end[goal])
+        return [piece for piece in pieces if (piece[:, :2] != piece[0, :2]).any()]
+
+    left = set(range(len(order)))
+    while left:
+        visit, pieces = min(left), []
+        while visit in left:
+            left.remove(visit)
+            pieces += arc(visit)
+            visit = int(after[visit]) ^ 1  # the other visit of the crossing
+        yield np.array(pieces).reshape(-1, *cubics.shape[1:])
+
+
+def _apart(ring: Floats) -> Iterator[Floats]:
+    """Yield a ring that touches itself in nodes as several."""
+    pieces: list[Floats] = []
+    places: dict[tuple[float, ...], int] = {}
+    for piece in ring:
+        places[tuple(piece[0, :2].tolist())] = len(pieces)
+        pieces.append(piece)
+        begin = places.get(tuple(piece[3, :2].tolist()))
+        if begin is not None:
+            yield np.stack(pieces[begin:])
+            del pieces[begin:]
+            places = {place: index for place, index in places.items() if index < begin}
+
+
+def _part(cubic: Floats, start: float, end: float) -> Floats:
+    return parts(cubic[None], np.array([start]), np.array([end]))[0]
+
+
+def _held(cubic: Floats, row: int, end: Floats) -> Floats:
+    """Return a cubic in whole numbers with one ``end`` there; a line has its handles at the thirds."""
+    steps = np.diff(cubic[:, :2], axis=0)
+    is_line = np.abs(steps - steps[1]).max() <= 1e-6 * np.abs(steps).max()
+    made = cubic.copy()
+    made[:, :2] = np.round(made[:, :2])
+    made[row, :2] = end
+    if is_line:
+        made[1, :2], made[2, :2] = (2 * made[0] + made[3])[:2] / 3, (made[0] + 2 * made[3])[:2] / 3
+    return made
+
+
+def reversed_ring(ring: Floats) -> Floats:
+    """Return a ring of cubics in the other direction."""
+    return ring[::-1, ::-1]
+
+
+def bounding(rings: list[Floats], new: list[Floats], painted: Painted, least: float) -> list[Floats]:
+    """Return the rings with paint on one side only, which run around it; of ``new`` ones, the large ones."""
+    is_small = [abs(area(polygon(ring[..., :2]))) < least for ring in new]
+    every = [*rings, *(ring for ring, is_left_out in zip(new, is_small, strict=True) if not is_left_out)]
+    lines = [polygon(ring[..., -2:]) for ring in every]
+    low, high = (np.array([extreme(points, axis=0) for points in lines]) for extreme in (np.min, np.max))
+    found = []
+    for i, (ring, line) in enumerate(zip(every, lines, strict=True)):
+        # Another ring may lie on a part of it: the places along it vote, by their lengths.
+        places = np.linspace(0, len(line), min(SAMPLES, len(line)), endpoint=False).astype(np.intp)
+        one, other = line[places], np.roll(line, -1, axis=0)[places]
+        near = np.flatnonzero(((low <= high[i]) & (low[i] <= high)).all(axis=1)).tolist()
+        around = sum(
+            (turns(lines[j], 0.5 * (one + other)) for j in near if j != i), np.zeros(len(one), np.intp)
+        )
+        is_clockwise = area(line) > 0
+        length, inside = np.hypot(*(other - one).T), painted(around + (1 if is_clockwise else -1))
+        is_outer, is_inner = (
+            float(length[side].sum()) for side in (inside & ~painted(around), painted(around) & ~inside)
+        )
+        if 2 * max(is_outer, is_inner) > length.sum():
+            found.append(ring if is_clockwise == (is_outer > is_inner) else reversed_ring(ring))
+    return found
+
+
+def polygon(ring: Floats) -> Floats:
+    """Return a ring of cubics as a polygon: (cubic, 4, 2) -> (point, 2)."""
+    return flattened(ring, PIECES)[:, :-1].reshape(-1, 2)
+
+
+def area(ring: Floats) -> float:
+    """Return the area inside a polygon [units²], negative if it runs from y towards x."""
+    x, y = ring[:, 0], ring[:, 1]
+    return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def turns(ring: Floats, points: Floats) -> IndexArray:
+    """Return how often a polygon winds around each of some points, positive from x towards y."""
+    one, other = ring - points[:, None], np.roll(ring, -1, axis=0) - points[:, None]
+    up, down = (one[..., 1] <= 0) & (other[..., 1] > 0), (one[..., 1] > 0) & (other[..., 1] <= 0)
+    side = one[..., 0] * other[..., 1] - other[..., 0] * one[..., 1]
+    return np.asarray((up & (side > 0)).sum(axis=1) - (down & (side < 0)).sum(axis=1), np.intp)
