@@ -31,8 +31,8 @@ from warpsplat.run.options import settings_from, with_preset
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder, of several numbers of"
-    " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is stdout; of several images a folder, of several"
+    " numbers of shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
 @click.option(
