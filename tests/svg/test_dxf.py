@@ -167,6 +167,18 @@ def test_a_background_on_a_sheet_is_left_out() -> None:
     )  # margins are in whole units
 
 
+def test_what_changes_the_look_of_edges_only_is_accepted() -> None:
+    """Pixel art on a sheet, and strokes of an image with other resolutions along than down."""
+    text = (
+        f'{HEAD}width="20" height="10" viewBox="0 0 7 7" preserveAspectRatio="none" '
+        'shape-rendering="crispEdges">'
+        '<path d="M0 0H7V7H0z"/><path d="M0 0L7 7" stroke="red"/></svg>'
+    )
+    cell, stroke = read(text).modelspace()
+    assert np.allclose(points_of(cell).max(axis=0), [20 * PIXEL, 10 * PIXEL])
+    assert np.allclose(points_of(stroke), np.array([[0, 10], [20, 0]]) * PIXEL, atol=1e-6)
+
+
 def test_other_elements_are_refused() -> None:
     with pytest.raises(ImageError, match="<text>"):
         draw_dxf(f'{HEAD}width="9" height="9"><text>a</text></svg>', "arcs")

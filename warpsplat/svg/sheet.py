@@ -34,7 +34,8 @@ class Drawn:
 def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Drawn:
     """Return what an SVG draws.
 
-    Fills end at the page's border, as in a viewer. A group's opacity becomes that of its shapes.
+    Fills end at the page's border, as in a viewer. A group's opacity becomes that of its shapes. Strokes that are
+    stretched have their mean width.
 
     Args:
         text: The SVG.
@@ -49,7 +50,7 @@ def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Draw
     if size is None:
         raise ImageError("has neither its size nor a viewBox")
     width, height = size
-    shapes = read_shapes(text, 0, 0, 1.0, see_through=True)
+    shapes = read_shapes(text, 0, 0, 1.0, see_through=True, outlines=True)
     left, top, right, bottom = picture_area(text) or (0.0, 0.0, 1.0, 1.0)
     area = np.array([[left * width, top * height], [right * width, bottom * height]])
     if not background and len(shapes) > 1 and is_background(shapes[0], area):
