@@ -13,7 +13,7 @@ from warpsplat.files.output import SVG_ENDINGS, check_ending, svg_bytes, write_r
 from warpsplat.fit.settings import DxfCurves
 from warpsplat.svg.dxf import draw_dxf
 from warpsplat.svg.eps import draw_eps
-from warpsplat.svg.sheet import drawn_on_page
+from warpsplat.svg.outlines import drawn_on_page
 from warpsplat.svg.viewer import draw_pdf, draw_png
 
 PICTURE_ENDINGS = (".png", ".pdf", ".dxf", ".eps")

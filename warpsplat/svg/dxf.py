@@ -13,7 +13,7 @@ import numpy as np
 
 from warpsplat.svg.arcs import Floats, as_arcs, as_lines, points_at
 from warpsplat.svg.paths import Subpath, line
-from warpsplat.svg.sheet import color_of, drawn_on_page
+from warpsplat.svg.outlines import color_of, drawn_on_page
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

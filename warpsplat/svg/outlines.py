@@ -34,8 +34,8 @@ class Drawn:
 def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Drawn:
     """Return what an SVG draws.
 
-    Fills end at the page's border, as in a viewer. A group's opacity becomes that of its shapes. Strokes that are
-    stretched have their mean width.
+    Fills end at the page's border, as in a viewer. A group's opacity becomes that of its shapes. Strokes that
+    are stretched have their mean width.
 
     Args:
         text: The SVG.
