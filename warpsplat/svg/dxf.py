@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpsplat.svg.arcs import Floats, as_arcs, as_lines, points_at
-from warpsplat.svg.paths import Subpath, line
 from warpsplat.svg.outlines import color_of, drawn_on_page
+from warpsplat.svg.paths import Subpath, line
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

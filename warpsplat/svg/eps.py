@@ -11,9 +11,9 @@ import numpy as np
 
 from warpsplat.scene import Cap, Join, Rule
 from warpsplat.svg.numbers import number
+from warpsplat.svg.outlines import color_of, drawn_on_page
 from warpsplat.svg.paths import Subpath
 from warpsplat.svg.shapes import LineStyle, Shape
-from warpsplat.svg.outlines import color_of, drawn_on_page
 
 POINTS = 72.0
 """Of an inch."""
