@@ -173,6 +173,11 @@ def quality_options(*, several: bool = False, refine: bool = False) -> Callable[
     return together(*(flag(option, several=several) for option in OPTIONS if option.refine or not refine))
 
 
+def option_called(name: str) -> Callable[[Function], Function]:
+    """Return the flag of one option in the table."""
+    return flag(next(option for option in OPTIONS if option.name == name))
+
+
 @dataclass(frozen=True)
 class Request:
     """One image, and the options of its command that are not settings."""

@@ -31,7 +31,8 @@ from warpsplat.fit.settings import make_settings
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf; - is the standard output.  [default: SVG-refined.svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is the standard output.  "
+    "[default: SVG-refined.svg, here]",
 )
 @overwrite_option
 @click.option(

@@ -8,9 +8,18 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import INPUT, OUTPUT, Request, overwrite_option, quiet_option, threads_option
+from warpsplat.cli.options import (
+    INPUT,
+    OUTPUT,
+    Request,
+    option_called,
+    overwrite_option,
+    quiet_option,
+    threads_option,
+)
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.extensions import renderer_names
+from warpsplat.fit.settings import DxfCurves
 
 
 @click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
@@ -19,9 +28,11 @@ from warpsplat.extensions import renderer_names
     "-o",
     "--output",
     type=OUTPUT,
-    help="PNG to write, or .pdf; - is the standard output, for a PNG.  [default: SVG with .png, here]",
+    help="PNG to write, or .pdf, .dxf, .eps; - is the standard output, for a PNG.  "
+    "[default: SVG with .png, here]",
 )
 @overwrite_option
+@option_called("dxf")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
 @click.option(
     "--renderer",
@@ -38,8 +49,8 @@ from warpsplat.extensions import renderer_names
 )
 @threads_option
 @quiet_option
-def command(svg: Path, scale: float, renderer: Any, **given: Any) -> None:
-    """Convert any SVG to a PNG, or its paths to a PDF; - is the standard input."""
+def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **given: Any) -> None:
+    """Convert any SVG to a PNG or PDF, or its paths to a DXF or EPS; - is the standard input."""
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result
@@ -53,7 +64,7 @@ def command(svg: Path, scale: float, renderer: Any, **given: Any) -> None:
     output = request.output_for(svg, ".png")
     check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=request.overwrite)
     check_format(output)
-    if renderer != "viewer" and output.suffix.lower() == ".pdf":
+    if renderer != "viewer" and output.suffix.lower() != ".png":
         raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
     text = read_svg_text(svg)
     try:
@@ -67,7 +78,7 @@ def command(svg: Path, scale: float, renderer: Any, **given: Any) -> None:
         elif output == STANDARD:
             write_result(output, mark_png(draw_png(text, zoom=scale)))
         else:
-            write_named(output, text, zoom=scale)
+            write_named(output, text, zoom=scale, dxf=dxf or "arcs")
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
     if not request.quiet and output != STANDARD:

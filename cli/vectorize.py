@@ -31,15 +31,16 @@ from warpsplat.run.options import settings_from, with_preset
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf; - is stdout; of several images a folder, of several numbers of"
-    " shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
+    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is stdout; of several images a folder, of several"
+    " numbers of shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
 @click.option(
     "--preset",
     metavar="NAME",
-    help="Options of a style: brush, ink, low-poly, placeholder, poster, stained-glass, or of a YAML file;"
-    " options beside it count more.",
+    help="Options of a style (brush, ink, low-poly, placeholder, poster, stained-glass), for a machine"
+    " (embroidery, laser-cut, laser-engrave, plotter, vinyl), or of a YAML file; options beside it count"
+    " more.",
 )
 @quality_options(several=True)
 @importance_option

@@ -1,4 +1,4 @@
-"""Batches whose results are PNGs and PDFs."""
+"""Batches whose results are no SVGs."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ from warpsplat.batch.executors.tasks import Stop
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.plan import plan_jobs
 from warpsplat.batch.run import Batch, JobOutcome
-from warpsplat.files.marks import mark_pdf, mark_png, picture_key
+from warpsplat.files.marks import mark_dxf, mark_eps, mark_pdf, mark_png, picture_key
 from warpsplat.files.output import may_replace
 
 SMALL = ("--curves", "3", "--iterations", "3", "--device", "cpu")
 
 
 def kept(folder: Path) -> dict[str, tuple[bytes, int]]:
-    return {path.name: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.glob("*.p*")}
+    return {path.name: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.glob("[ab].*")}
 
 
+@pytest.mark.parametrize(("other", "package"), [("pdf", "typst"), ("dxf", "ezdxf"), ("eps", "")])
 def test_pictures_are_made_once_with_and_without_a_manifest(
-    folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
+    other: str, package: str, folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
 ) -> None:
-    pytest.importorskip("typst")
+    if package:
+        pytest.importorskip(package)
     images = [folder / "in" / name for name in ("a.png", "b.png")]
-    ending = {"a": "png", "b": "pdf"}
+    ending = {"a": "png", "b": other}
     write(
         folder,
         "\n".join(
@@ -41,7 +43,7 @@ def test_pictures_are_made_once_with_and_without_a_manifest(
     assert run(*arguments) == 0
     assert "kB gzipped) as an SVG" in capsys.readouterr().out
     made = kept(folder / "out")
-    assert sorted(made) == ["a.png", "b.pdf"]
+    assert sorted(made) == ["a.png", f"b.{other}"]
     with Image.open(folder / "out" / "a.png") as shown, Image.open(images[0]) as given:
         assert shown.size == given.size
     notes = folder / "out" / NAME
@@ -146,7 +148,9 @@ def test_a_key_is_that_of_a_whole_picture(tmp_path: Path) -> None:
     Image.new("RGB", (5, 4)).save(path)
     plain = path.read_bytes()
     png, pdf = mark_png(plain, "aB3._x9Z"), mark_pdf(b"%PDF-1.7\n%%EOF", "aB3._x9Z")
-    assert picture_key(png) == picture_key(pdf) == "aB3._x9Z"
+    dxf = mark_dxf(b"  0\nSECTION\n  0\nENDSEC\n  0\nEOF\n", "aB3._x9Z")
+    eps = mark_eps(b"%!PS-Adobe-3.0 EPSF-3.0\n%%EOF\n", "aB3._x9Z")
+    assert {picture_key(data) for data in (png, pdf, dxf, eps)} == {"aB3._x9Z"}
     for data in (
         b"",
         plain,
@@ -154,6 +158,8 @@ def test_a_key_is_that_of_a_whole_picture(tmp_path: Path) -> None:
         png[:-1],
         pdf[:-1],
         pdf + b"x",
+        dxf[:-1],
+        eps[:-1],
         mark_pdf(b"%PDF-1.7"),
         b"\x89PNG",
     ):

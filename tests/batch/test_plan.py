@@ -186,7 +186,11 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    renderer: splat\n    basis: spline\n", 2, "needs the basis cubic"),
     ("? &a [*a]\n: 1\n", 1, "unknown key"),
     ("jobs:\n  - \x01\n", 2, "not allowed"),
-    ("jobs:\n  - {images: in/a.png, preset: fine}\n", 2, "there is no 'fine'; known are: brush, ink, "),
+    (
+        "jobs:\n  - {images: in/a.png, preset: fine}\n",
+        2,
+        "there is no 'fine'; known are: brush, embroidery, ",
+    ),
     ("presets: [fine]\njobs: [{images: in/a.png}]\n", 1, "presets: must be a mapping"),
     ("presets:\n  fine: {curvs: 3}\njobs: [{images: in/a.png}]\n", 2, "unknown key 'curvs' in preset 'fine'"),
     ("presets:\n  fine:\n    curves: 0\njobs: [{images: in/a.png}]\n", 3, "curves"),

@@ -15,14 +15,25 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Basis, Kind
 
-NAMES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
+STYLES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
+MACHINES = ["embroidery", "laser-cut", "laser-engrave", "plotter", "vinyl"]
 
 
 def test_those_that_there_are() -> None:
-    assert preset_names() == NAMES
-    for name in NAMES:
+    assert preset_names() == sorted(STYLES + MACHINES)
+    for name in preset_names():
         make_settings(**load_preset(name))
         assert (FOLDER / f"{name}.yaml").read_text("utf-8").startswith("# "), "says what it is for"
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_those_for_machines_make_outlines_of_a_known_size(name: str, tmp_path: Path) -> None:
+    pixels = np.full((40, 60, 3), 255, np.uint8)
+    pixels[10:30, 15:45] = (0, 0, 0)
+    made = warpsplat.vectorize(pixels, preset=name, quality="draft", device="cpu")
+    assert made.subject == make_settings(**load_preset(name)).subject != "photo"
+    assert 'mm" height="' in made.svg[:200]
+    made.save(tmp_path / "a.eps")
 
 
 def test_options_beside_a_preset_count_more() -> None:
@@ -42,7 +53,7 @@ def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixt
     assert run("vectorize", image, "-o", tmp_path / "b.svg", "--preset", own, *quick) == 0
     assert (tmp_path / "b.svg").read_text("utf-8").count("<circle") == 6
     assert run("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick) == 2
-    assert "known are: brush, ink" in one_line(capfd.readouterr().err)
+    assert "known are: brush, embroidery" in one_line(capfd.readouterr().err)
     own.write_text("shape: circle\ncurve: 99\n", "utf-8")
     assert run("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick) == 2
     assert "mine.yaml:2: unknown key 'curve'" in one_line(capfd.readouterr().err)
@@ -59,7 +70,7 @@ def test_batch_files_know_them(folder: Path) -> None:
     )
     assert [job.settings.curves for job in jobs] == [3, 7]
     assert [job.settings.shape for job in jobs] == ["curve", "triangle"]
-    with pytest.raises(UsageError, match="there is no 'oil'; known are: ink, brush, ink"):
+    with pytest.raises(UsageError, match="there is no 'oil'; known are: ink, brush, embroidery"):
         load_jobs(write(folder, "presets: {ink: {curves: 3}}\njobs: [{images: in/a.png, preset: oil}]"))
 
 

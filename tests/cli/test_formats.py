@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
 from warpsplat.run.formats import write_named
 from warpsplat.run.svg import load_svg, save_svg
+from warpsplat.run.vectorize import vectorize
 from warpsplat.svg.viewer import on_white, render_svg
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="64" height="48">
@@ -102,14 +102,15 @@ def test_the_library_writes_them_as_well(tmp_path: Path) -> None:
 def test_a_missing_package_is_named_before_any_work(
     image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "typst", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    path = image.parent / "a.pdf"
-    assert run("vectorize", image, "-o", path, *QUICK) == 2
-    assert "pip install typst, or warpsplat with its extra: '.[pdf]'" in one_line(capsys.readouterr().err)
-    with pytest.raises(UsageError, match="pip install typst"):
-        write_named(path, SVG)
-    assert not path.exists()
+    for extra, package in (("pdf", "typst"), ("dxf", "ezdxf")):
+        path = image.parent / f"a.{extra}"
+        assert run("vectorize", image, "-o", path, *QUICK) == 2
+        message = f"pip install {package}, or warpsplat with its extra: '.[{extra}]'"
+        assert message in one_line(capsys.readouterr().err)
+        with pytest.raises(UsageError, match=f"pip install {package}"):
+            write_named(path, SVG)
+        assert not path.exists()
 
 
 def test_render_makes_a_pdf(tmp_path: Path) -> None:
@@ -118,3 +119,42 @@ def test_render_makes_a_pdf(tmp_path: Path) -> None:
     svg.write_text(SVG)
     assert run("render", svg, "-o", tmp_path / "a.pdf", "--scale", 2) == 0
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF-")
+
+
+PATHS = SVG.replace('clip-path="url(#c)"', "")
+"""The same without a clip, of which no outlines are made."""
+
+
+@pytest.mark.parametrize(("ending", "begins"), [("dxf", b"  0\nSECTION\n"), ("eps", b"%!PS-Adobe-3.0 EPSF")])
+def test_files_for_machines_are_written_and_known(
+    ending: str, begins: bytes, image: Path, tmp_path: Path
+) -> None:
+    if ending == "dxf":
+        pytest.importorskip("ezdxf")
+    svg, path = tmp_path / "a.svg", tmp_path / f"a.{ending}"
+    svg.write_text(PATHS)
+    for arguments in (("render", svg, "--scale", 2), ("vectorize", image, *QUICK)):
+        assert run(*arguments, "-o", path, "--dxf", "lines") == 0
+        assert path.read_bytes().startswith(begins)
+        assert may_replace(path)
+    path.write_bytes(path.read_bytes().replace(b"warpsplat", b"somebody"))
+    assert not may_replace(path)
+
+
+def test_how_curves_are_written(image: Path, tmp_path: Path) -> None:
+    pytest.importorskip("ezdxf")
+    result = vectorize(image, curves=3, iterations=3, device="cpu", dxf="r12", output=tmp_path / "a.dxf")
+    result.save(tmp_path / "b.dxf", dxf="r12")
+    result.save(tmp_path / "c.dxf")
+    made = [(tmp_path / f"{name}.dxf").read_bytes() for name in "abc"]
+    assert made[0] == made[1] != made[2]
+    assert b"AC1009" in made[0] and b"AC1018" in made[2]
+
+
+def test_what_is_no_path_is_refused_before_any_work(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    svg = tmp_path / "a.svg"
+    svg.write_text(PATHS.replace("</svg>", "<text>a</text></svg>"))
+    assert run("refine", svg, image, "--keep", "-o", tmp_path / "b.eps", "--iterations", 3) == 3
+    assert "<text>" in one_line(capsys.readouterr().err)

@@ -77,8 +77,8 @@ USAGE = [
         for line in (*OPTIMISING, "render drawing.svg")
         for name in ("a.jpg", "a.txt", "a")
     ],
-    ("vectorize photo.png -o a.gz", "a result's name ends with .svg, .svgz, .png or .pdf"),
-    ("render drawing.svg -o a.svgz", "a result's name ends with .png or .pdf"),
+    ("vectorize photo.png -o a.gz", "a result's name ends with .svg, .svgz, .png, .pdf, .dxf or .eps"),
+    ("render drawing.svg -o a.svgz", "a result's name ends with .png, .pdf, .dxf or .eps"),
     ("refine drawing.svg photo.png -o drawing.svg", "is the input itself"),
     ("render drawing.svg -o drawing.svg", ""),
     ("render drawing.svg -o a.pdf --renderer exact", "makes pixels"),

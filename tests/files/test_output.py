@@ -18,7 +18,7 @@ from tests.fuzz.corpus import saved
 from tests.scenes import random_scene
 from warpsplat.errors import OutputError, UsageError
 from warpsplat.files import output as files
-from warpsplat.files.marks import mark_pdf, mark_png
+from warpsplat.files.marks import mark_dxf, mark_eps, mark_pdf, mark_png
 from warpsplat.files.output import SVG_ENDINGS, check_output, write_atomically
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
@@ -140,10 +140,12 @@ def test_files_that_may_be_replaced(tmp_path: Path) -> None:
     png = saved(Image.new("RGB", (4, 4)), "PNG")
     drawn = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
     ours = write_svg(random_scene(Kind.FILL, count=3, width=40, height=30)).encode()
-    for data in (b"", ours, gzip.compress(ours), mark_png(png), mark_pdf(b"%PDF-1.7")):
+    dxf, eps = b"  0\nSECTION\n  2\nHEADER\n  0\nENDSEC\n  0\nEOF", b"%!PS-Adobe-3.0 EPSF-3.0\n%%EOF\n"
+    known = mark_png(png), mark_pdf(b"%PDF-1.7"), mark_dxf(dxf), mark_eps(eps)
+    for data in (b"", ours, gzip.compress(ours), *known):
         path.write_bytes(data)
         check_output(path, overwrite=False)
-    for data in (drawn, png, b"%PDF-1.7", b"RIFF, some other WebP"):
+    for data in (drawn, png, b"%PDF-1.7", dxf, eps, b"RIFF, some other WebP"):
         path.write_bytes(data)
         with pytest.raises(UsageError, match="was not written by warpsplat; --overwrite"):
             check_output(path, overwrite=False)

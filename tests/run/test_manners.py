@@ -149,7 +149,9 @@ def test_a_result_spares_files_of_others_if_it_is_told_to(tmp_path: Path) -> Non
 def test_a_result_is_no_file_of_another_kind(tmp_path: Path) -> None:
     """An SVG's text in a .jpg could not be opened."""
     result = warpsplat.vectorize(np.zeros((8, 8, 3), np.uint8), subject="pixel")
-    with pytest.raises(UsageError, match=r"a\.jpg: a result's name ends with \.svg, \.svgz, \.png or \.pdf"):
+    with pytest.raises(
+        UsageError, match=r"a\.jpg: a result's name ends with \.svg, \.svgz, \.png, \.pdf, \.dxf or \.eps"
+    ):
         result.save(tmp_path / "a.jpg")
     with pytest.raises(UsageError, match="curves must be several numbers of shapes, not 5"):
         warpsplat.vectorize_several(np.zeros((8, 8, 3), np.uint8), 5)

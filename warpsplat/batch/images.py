@@ -73,7 +73,7 @@ def _is_image(path: Path) -> bool:
         return True
 
 
-RESULTS = (".svg", ".svgz", ".pdf")
+RESULTS = (".svg", ".svgz", ".pdf", ".dxf", ".eps")
 """Endings of results that are no images; a PNG may be either."""
 
 

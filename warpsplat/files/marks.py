@@ -1,8 +1,8 @@
 """Marks of files written here, so that nothing else is replaced, and the key of the job that made each
 picture.
 
-An SVG and a page have a comment, a PNG a text chunk behind its header, a GIF a comment, a PDF, a WebP and an
-MP4 something at their ends that readers ignore.
+An SVG, an EPS and a page have a comment, a PNG a text chunk behind its header, a GIF a comment, a PDF, a DXF,
+a WebP and an MP4 something at their ends that readers ignore.
 """
 
 from __future__ import annotations
@@ -54,6 +54,20 @@ PDF_START = b"%PDF-"
 
 PDF_KEY = re.compile(rb"\n%warpsplat(?: ([\w.]{1,20}))?\n\Z")
 
+DXF_START = b"  0\nSECTION\n"
+"""The beginning of DXFs that the package writes which we use."""
+
+DXF_END = b"  0\nEOF"
+
+DXF_KEY = re.compile(rb"\n999\nwarpsplat(?: ([\w.]{1,20}))?\n  0\nEOF\n\Z")
+"""A comment before the end."""
+
+EPS_START = b"%!PS-Adobe-3.0 EPSF-3.0\n"
+
+EPS_KEY = re.compile(re.escape(EPS_START) + rb"%%Creator: warpsplat(?: ([\w.]{1,20}))?\n")
+
+EPS_END = b"%%EOF\n"
+
 GZIP = b"\x1f\x8b"
 """The beginning of gzipped files."""
 
@@ -70,10 +84,26 @@ def mark_pdf(pdf: bytes, key: str = "") -> bytes:
     return pdf + b"\n%warpsplat" + f" {key}".rstrip().encode() + b"\n"
 
 
+def mark_dxf(dxf: bytes, key: str = "") -> bytes:
+    """Return a DXF with a comment before its end, as ``mark_png``."""
+    body = dxf[: dxf.rindex(DXF_END)]
+    return body + b"999\nwarpsplat" + f" {key}".rstrip().encode() + b"\n" + DXF_END + b"\n"
+
+
+def mark_eps(eps: bytes, key: str = "") -> bytes:
+    """Return an EPS with a comment behind its first line, as ``mark_png``."""
+    head, rest = eps[: len(EPS_START)], eps[len(EPS_START) :]
+    return head + b"%%Creator: warpsplat" + f" {key}".rstrip().encode() + b"\n" + rest
+
+
 def is_marked(head: bytes, tail: bytes) -> bool:
     """Return whether a file was written here or is empty; by its first ``HEAD`` and last ``TAIL`` bytes."""
     if head.startswith(PDF_START):
         return PDF_KEY.search(tail) is not None
+    if head.startswith(DXF_START):
+        return DXF_KEY.search(tail) is not None
+    if head.startswith(EPS_START):
+        return EPS_KEY.match(head) is not None
     for place, signature, mark in ((0, b"RIFF", WEBP_MARK), (4, b"ftyp", MP4_MARK)):
         if head.startswith(signature, place):
             return tail.endswith(mark)
@@ -93,12 +123,16 @@ def unpacked(head: bytes) -> bytes:
 
 
 def picture_key(data: bytes) -> str:
-    """Return the key in a PNG or PDF; empty: it has none, was truncated, or is something else."""
+    """Return the key in a PNG, PDF, DXF or EPS; empty: it has none, was truncated, or is something else."""
     found = None
     if data.startswith(PNG_SIGNATURE) and data.endswith(PNG_END):
         found = PNG_KEY.match(data, PNG_HEADER + 4)  # behind the length of the chunk
     elif data.startswith(PDF_START):
         found = PDF_KEY.search(data[-TAIL:])
+    elif data.startswith(DXF_START):
+        found = DXF_KEY.search(data[-TAIL:])
+    elif data.endswith(EPS_END):
+        found = EPS_KEY.match(data)
     return (found[1] or b"").decode("ascii", "replace") if found else ""
 
 

@@ -38,6 +38,7 @@ Painting = Literal["flat", "linear", "radial", "auto"]
 OpticsChoice = Literal["auto", "none"]
 Stack = Literal["overlap", "cutout"]
 LossName = Literal["l2", "ssim", "edges"]
+DxfCurves = Literal["arcs", "splines", "lines", "r12"]
 
 SUBJECTS = {
     "photo": "photograph",
@@ -318,6 +319,11 @@ class Settings:
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
     page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
     units: str = option("", "Unit of the size in the file: mm, cm, in, pt, px.", metavar="UNIT")
+    dxf: DxfCurves = option(
+        "arcs",
+        "Curves in a .dxf: arcs; splines; lines, for OpenSCAD; r12: lines, for old programs.",
+        refine=True,
+    )
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )

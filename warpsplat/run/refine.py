@@ -28,7 +28,7 @@ from warpsplat.rendering.failures import failures_of
 from warpsplat.run.arguments import backend_on, check_keywords, custom_loss, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
-from warpsplat.run.formats import write_named
+from warpsplat.run.formats import check_paths, write_named
 from warpsplat.run.memory import DeviceMemory, check_refined
 from warpsplat.run.prepare import load_target
 from warpsplat.run.result import Result
@@ -97,6 +97,8 @@ def refine(
     text, image_name = text_of(svg, name), source_name(image)
     pixels = held(image)
     check_refined(pixels, settings, image_name)
+    if output is not None:
+        check_paths(path_of(output), text, name)
     problem = Problem(load_target(pixels, image_name, settings.background), settings, loss=loss)
     kept = open_checkpoint(checkpoint, checkpoint_every, (image, output), resume=resume, overwrite=overwrite)
     with backend_on(device, threads) as backend:
@@ -105,7 +107,7 @@ def refine(
         run = Run(backend, callback, stop, checkpoint=saved)
         result = refine_svg(text, problem, run, name, keep=keep)
     if output is not None:
-        write_named(path_of(output), result.svg)
+        write_named(path_of(output), result.svg, dxf=settings.dxf)
     if run.failures:
         raise failed(run, name, result)
     if kept and not result.stopped:

@@ -15,7 +15,7 @@ from warpsplat.field_docs import described
 from warpsplat.files.output import check_output
 from warpsplat.files.remote import path_of
 from warpsplat.fit.progress import Progress
-from warpsplat.fit.settings import Settings, Subject
+from warpsplat.fit.settings import DxfCurves, Settings, Subject
 from warpsplat.metrics import Score
 from warpsplat.run.explained import Explained
 from warpsplat.run.formats import write_named
@@ -92,21 +92,22 @@ class Result:
     kept: str = ""
     """Elements that a refined SVG keeps as they are, for people; empty: none."""
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = True) -> None:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = True, dxf: DxfCurves = "arcs") -> None:
         """Write the result atomically; an existing file is replaced, whoever wrote it.
 
         ``overwrite=False`` refuses to replace a file that warpsplat did not write, as the command line does.
-        The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, or ``.pdf``
-        (the extra ``pdf``) its paths.
+        The ending decides the format: ``.svg``, ``.svgz`` gzipped, ``.png`` as a viewer shows it, or its
+        paths as ``.pdf`` (the extra ``pdf``), ``.eps``, or ``.dxf`` (the extra ``dxf``), whose curves are as
+        ``dxf`` says.
 
         Raises:
-            UsageError: the package that makes PDFs is not installed, or ``path`` is such a file.
+            UsageError: the package that makes such files is not installed, or ``path`` is such a file.
             OutputError: it cannot be written.
         """
         file = path_of(path)
         if not overwrite:
             check_output(file, overwrite=False)
-        write_named(file, self.svg)
+        write_named(file, self.svg, dxf=dxf)
 
     def __repr__(self) -> str:
         return f"Result({self._summary()})"

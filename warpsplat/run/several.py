@@ -115,8 +115,9 @@ def _results(
     shares = guess_subject(image.problem.target).subject == "photo"
     series = Series(image.problem.settings, numbers, shares=shares)
     results: dict[int, Result] = {}
+    dxf = image.problem.settings.dxf
     for number in sorted(numbers):
-        write = functools.partial(write_named, outputs[number]) if number in outputs else None
+        write = functools.partial(write_named, outputs[number], dxf=dxf) if number in outputs else None
         most = max(results, default=0)
         drawn = image.problem.settings.subject == "drawing"
         if drawn and most and len(results[most].scene) < most:  # it has all regions already

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Stack, Subject
+from warpsplat.fit.settings import DxfCurves, LossName, OpticsChoice, Painting, Quality, Stack, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -16,6 +16,7 @@ class RefineOptions(TypedDict, total=False):
     time_budget: float | str | None
     background: str | None
     title: str | None
+    dxf: DxfCurves | None
     ids: bool | None
     simple: bool | None
     separate: bool | None

@@ -104,7 +104,7 @@ def vectorize(
     settings = settings_given(vectorize, settings, curves=curves, **given)
     given_files = (image, importance, output)
     kept = open_checkpoint(checkpoint, checkpoint_every, given_files, resume=resume, overwrite=overwrite)
-    write = None if output is None else functools.partial(write_named, path_of(output))
+    write = None if output is None else functools.partial(write_named, path_of(output), dxf=settings.dxf)
     with backend_on(device, threads) as backend:
         prepared = prepare(
             image, settings, name=name, importance=importance, loss=loss, keyed=keyed, backend=backend

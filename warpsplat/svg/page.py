@@ -150,6 +150,18 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
     return f"0 0 {units * width:.10g} {units * height:.10g}"
 
 
+def picture_area(svg: str) -> tuple[float, float, float, float] | None:
+    """Return the left, top, right and bottom of the picture on a sheet written here, over the sheet's sides.
+
+    Margins are in whole units, so that right and bottom may be two units too small. None: no such sheet.
+    """
+    found = OUR_VIEW.match(svg)
+    if not found:
+        return None
+    left, top, across, down = (float(found[i]) for i in range(2, 6))
+    return -left / across, -top / down, 1 + (left - 1) / across, 1 + (top - 1) / down
+
+
 def with_view(svg: str, view: str, width: int, height: int) -> str:
     """Return a file on a sheet with the view box ``view`` and the image's size [px]."""
     return VIEW.sub(head_of(width, height, view).removesuffix(">"), svg, count=1)

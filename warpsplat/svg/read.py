@@ -82,14 +82,17 @@ def _points(subpath: Subpath, closed: bool) -> Points:
     return _ring(subpath) if closed else subpath.points
 
 
-def _is_background(shape: Shape, width: int, height: int) -> bool:
-    """Return whether a shape is an opaque upright rectangle that covers the canvas."""
+def is_background(shape: Shape, area: Points) -> bool:
+    """Return whether a shape is an opaque upright rectangle that covers a canvas.
+
+    ``area``: the least and largest coordinates of the canvas [px], shape (2, 2).
+    """
     if not (shape.is_rect and isinstance(shape.paint, FlatColor) and opacity_of(shape) == 1):
         return False
     corners = shape.subpaths[0].points[::3]
     upright = (np.isclose(np.diff(corners, axis=0), 0, atol=1e-6).sum(axis=1) >= 1).all()
     low, high = corners.min(axis=0), corners.max(axis=0)
-    return bool(upright and (low <= 0.5).all() and (high >= np.array([width, height]) - 0.5).all())
+    return bool(upright and (low <= area[0] + 0.5).all() and (high >= area[1] - 0.5).all())
 
 
 def load_scene(
@@ -117,11 +120,11 @@ def scene_of(
     has_background = (
         background_apart
         and len(shapes) > 1
-        and _is_background(shapes[0], width, height)
+        and is_background(shapes[0], np.array([[0, 0], [width, height]], np.float64))
         and not shapes[1].is_twin
     )
     if has_background:
-        background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # _is_background has checked
+        background = np.array(shapes[0].paint.color)  # type: ignore[union-attr]  # is_background has checked
         shapes = shapes[1:]
     bases, rings, closed = zip(*_outlines(shapes, forms), strict=True) if shapes else ((), (), ())
     contours = list(chain.from_iterable(rings))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from warpsplat.errors import ImageError
+from warpsplat.portable.linear import determinant
 from warpsplat.scene import Cap, Join, Picture, Rule
 from warpsplat.svg.css import ANIMATED
 from warpsplat.svg.document import Document, Element, Style, name_of
@@ -89,6 +90,8 @@ class Placement:
     """The values of ``context-fill`` and ``context-stroke``."""
     path: tuple[Element, ...]
     """The links that show it."""
+    outlines: bool
+    """Whether what changes the look of edges only is accepted, see ``structure.read_shapes``."""
 
 
 def element_shapes(element: Element, document: Document, place: Placement) -> list[Shape]:
@@ -115,7 +118,7 @@ def element_shapes(element: Element, document: Document, place: Placement) -> li
     fill = _paint("fill", document, place, own) if tag != "line" else None
     stroke = _paint("stroke", document, place, own) if line else None
     subpaths = [subpath.moved(place.matrix[:2, :2], place.matrix[:2, 2]) for subpath in own]
-    _check(style, subpaths, line if stroke else None)
+    _check(place, subpaths, line if stroke else None)
     shapes = []
     if fill:
         rule = Rule.EVENODD if style["fill-rule"] == "evenodd" else Rule.NONZERO
@@ -124,7 +127,7 @@ def element_shapes(element: Element, document: Document, place: Placement) -> li
             Shape(subpaths, fill, fraction(style["fill-opacity"]), None, rule, is_rect=upright, tag=tag)
         )
     if stroke and line:
-        if similarity(place.matrix) is None:
+        if similarity(place.matrix) is None and not place.outlines:
             raise ImageError("a stroke that a transform stretches is not supported")
         shapes.append(Shape(subpaths, stroke, fraction(style["stroke-opacity"]), line, tag=tag))
     if len(shapes) == 2:
@@ -161,7 +164,8 @@ CONTEXTS = ("context-fill", "context-stroke")
 
 def _line(place: Placement) -> LineStyle | None:
     """Return how a stroke is drawn; None: it is not."""
-    style, viewport, scale = place.style, place.viewport, similarity(place.matrix) or 1.0
+    style, viewport, linear = place.style, place.viewport, place.matrix[:2, :2]
+    scale = similarity(place.matrix) or math.sqrt(abs(determinant(linear)))
 
     def get(name: str, default: float) -> float:
         value = length(style[name], viewport.diagonal, name, viewport.font_size)
@@ -201,12 +205,14 @@ def _strokes_first(order: str) -> bool:
     return is_valid and "fill" not in words[: words.index("stroke")]
 
 
-def _check(style: Style, subpaths: list[Subpath], line: LineStyle | None) -> None:
+def _check(place: Placement, subpaths: list[Subpath], line: LineStyle | None) -> None:
     """Raise ``ImageError`` for an element that a scene cannot hold."""
+    style = place.style
     if any(style[name] != "none" for name in ("marker-start", "marker-mid", "marker-end")):
         raise ImageError("uses markers, not supported")
     rendering = style["shape-rendering"]
-    if rendering not in {"auto", "geometricPrecision"} and (line or not _is_of_pixels(subpaths)):
+    changes_edges = rendering not in {"auto", "geometricPrecision"} and not place.outlines
+    if changes_edges and (line or not _is_of_pixels(subpaths)):
         raise ImageError(f"uses shape-rendering {rendering[:40]!r}, not supported")
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")

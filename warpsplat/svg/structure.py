@@ -117,7 +117,13 @@ class _End:
 
 
 def read_shapes(
-    text: str, width: int, height: int, scale: float | None = None, *, see_through: bool = False
+    text: str,
+    width: int,
+    height: int,
+    scale: float | None = None,
+    *,
+    see_through: bool = False,
+    outlines: bool = False,
 ) -> list[Shape]:
     """Return the shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
 
@@ -127,15 +133,25 @@ def read_shapes(
         height: Height of the picture.
         scale: Magnification; None: the SVG fills the picture, which has its proportions.
         see_through: Fade overlapping shapes of a translucent group one by one, rather than refuse them.
+        outlines: Accept what changes the look of edges only: ``shape-rendering``, and strokes that a
+            transform stretches, which get their mean width.
 
     Raises:
         ImageError: Not an SVG, of other proportions, or with something that would be lost.
     """
-    return shapes_of(read_parts(text, width, height, scale, keep=False, see_through=see_through)[0])
+    parts, _ = read_parts(text, width, height, scale, keep=False, see_through=see_through, outlines=outlines)
+    return shapes_of(parts)
 
 
 def read_parts(
-    text: str, width: int, height: int, scale: float | None = None, *, keep: bool, see_through: bool = False
+    text: str,
+    width: int,
+    height: int,
+    scale: float | None = None,
+    *,
+    keep: bool,
+    see_through: bool = False,
+    outlines: bool = False,
 ) -> tuple[list[Part], Document]:
     """Return the shapes as ``read_shapes``, and the document.
 
@@ -146,7 +162,7 @@ def read_parts(
     try:
         with np.errstate(all="ignore"):  # points of shapes are checked for overflow
             document = Document(text)
-            walk = _Walk(document, keep=keep, see_through=see_through)
+            walk = _Walk(document, keep=keep, see_through=see_through, outlines=outlines)
             return walk.parts_in(*_canvas(root, width, height, scale)), document
     except (ImageError, MemoryError):
         raise
@@ -175,9 +191,9 @@ def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) 
 class _Walk:
     """A walk through a document in painter's order, with a stack of its own: nesting may exceed Python's."""
 
-    def __init__(self, document: Document, *, keep: bool, see_through: bool) -> None:
+    def __init__(self, document: Document, *, keep: bool, see_through: bool, outlines: bool) -> None:
         self._document, self._see_through = document, see_through
-        self._keep = keep
+        self._keep, self._outlines = keep, outlines
         self._shapes: list[Part] = []
         self._todo: list[tuple[Element, _Context] | _End] = []
         self._linked = 0
@@ -187,7 +203,8 @@ class _Walk:
     def parts_in(self, matrix: Matrix, viewport: SvgViewport) -> list[Part]:
         """Return all shapes, mapped by ``matrix``, and elements that are kept."""
         self._background(matrix, viewport)
-        self._todo = [(self._document.root, _Context(ROOT, matrix, viewport, ("none", "none"), (), 0))]
+        root = _Context(ROOT, matrix, viewport, ("none", "none"), (), self._outlines, 0)
+        self._todo = [(self._document.root, root)]
         while self._todo:
             item = self._todo.pop()
             if isinstance(item, _End):

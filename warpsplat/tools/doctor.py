@@ -32,6 +32,7 @@ PACKAGES = {
 EXTRAS = {
     "torch": ("torch", "warpsplat.torch, and code written for DiffVG"),
     "pdf": ("typst", "outputs that end in .pdf"),
+    "dxf": ("ezdxf", "outputs that end in .dxf"),
     "video": ("av", "animations that end in .mp4"),
     "compare": ("vtracer", "warpsplat compare"),
     "ray": ("ray", "warpsplat batch --executor ray"),

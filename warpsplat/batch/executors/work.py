@@ -43,7 +43,7 @@ def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
         raise
     except BaseException as error:  # a panic of Rust code derives from no Exception
         words, saved = failure(error, task.name, task.output), getattr(error, "result", None)
-        data = named_bytes(Path(task.output), saved.svg, key=STOPPED) if saved else None
+        data = _file(task, saved.svg, STOPPED) if saved else None
         spent = isinstance(error, DeviceError) and error.is_lost
         return Outcome(task.number, "failed", key=task.key, data=data, error=words, spent=spent)
 
@@ -70,10 +70,15 @@ def _made(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
             task.image, task.settings, name=task.name, importance=mask, keyed=True, backend=backend
         )
         result = make_result(prepared, Run(backend, advance, stop))
-        data = named_bytes(Path(task.output), result.svg, key=STOPPED if result.stopped else task.key)
+        data = _file(task, result.svg, STOPPED if result.stopped else task.key)
         status: Literal["stopped", "made"] = "stopped" if result.stopped else "made"
         outcome = Outcome(task.number, status, task.key, data, result.as_dict())
         return outcome if result.stopped else _with_report(outcome, task, result.svg, backend, result)
+
+
+def _file(task: Task, svg: str, key: str) -> bytes:
+    """Return the bytes of a task's result."""
+    return named_bytes(Path(task.output), svg, key=key, dxf=task.settings.dxf)
 
 
 def _measured(task: Task, data: bytes) -> Outcome:
