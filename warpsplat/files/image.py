@@ -20,6 +20,7 @@ from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.profile import Profile, profile_of
+from warpsplat.files.resolution import SWAPPED, Resolution, resolution_of
 from warpsplat.native import messages_hidden
 from warpsplat.portable.filters import boxed
 from warpsplat.portable.sequences import interp
@@ -219,6 +220,8 @@ class ImageFacts:
     """Bytes a pixel of the whole image that decoding takes at any size."""
     deep: bool = False
     """See ``is_deep``."""
+    resolution: Resolution | None = None
+    """That the file states, if it does."""
 
 
 def image_facts(source: bytes) -> ImageFacts | None:
@@ -231,11 +234,12 @@ def image_facts(source: bytes) -> ImageFacts | None:
             taken = taken * (2 if orientation != 1 else 1) + (0 if image.format in PLAIN_FORMATS else 8)
             if is_deep(image):  # all of it is held as floats
                 taken += 16
-            if orientation in range(5, 9):
+            if orientation in SWAPPED:
                 width, height = height, width
             kept = 6 if image.info.get("progressive") else 0  # the coefficients of a progressive JPEG
             channels = 4 if _is_transparent(image) else 3
-            return ImageFacts(width, height, channels, taken, image.format == "JPEG", kept, is_deep(image))
+            drafts, resolution = image.format == "JPEG", resolution_of(image)
+            return ImageFacts(width, height, channels, taken, drafts, kept, is_deep(image), resolution)
     except Exception:  # Pillow's decoders raise nearly every kind of exception on broken data
         return None
 

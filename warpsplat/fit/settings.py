@@ -316,7 +316,18 @@ class Settings:
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
     page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
-    units: str = option("", "Unit of the size in the file: mm, cm, in, pt, px.", metavar="UNIT")
+    units: str = option(
+        "",
+        "Unit of the size in the file, which follows from the image's resolution: mm, cm, in, pt; or px.",
+        metavar="UNIT",
+    )
+    dpi: float | None = option(
+        None,
+        "Resolution of the image in pixels an inch, for its size in the file.",
+        (1, 1e6),
+        shown_default="that in the image file, else 96",
+        metavar="N",
+    )
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
@@ -417,6 +428,12 @@ class Settings:
         return "palette" if self.palette else "colors"
 
     @property
+    def sized_by(self) -> str:
+        """Name of an option that gives the file a size on paper; empty: none."""
+        options = (("size", self.size), ("page", self.page), ("dpi", self.dpi), ("units", self.units))
+        return next((name for name, value in options if value), "")
+
+    @property
     def counting(self) -> list[str]:
         """Names of the options given, other than ``curves``, that decide the number of shapes."""
         given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
@@ -497,6 +514,8 @@ RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     ),
     (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} cannot be combined"),
     (lambda s: s.size and s.page, "size and page cannot be combined"),
+    (lambda s: s.dpi and (s.size or s.page), "dpi and {0.sized_by} cannot be combined"),
+    (lambda s: s.dpi and s.units == "px", "dpi and units px cannot be combined"),
 )
 """Contradictions: whether settings have one, and its message, in which ``{0}`` stands for them. Those with a
 subject follow from ``Option.subjects``, those with a renderer from ``FitRenderer.check``."""
@@ -537,10 +556,12 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
-    if settings.size or settings.page or settings.units:
-        from warpsplat.svg.page import sheet_for  # brings what writes files
+    if settings.sized_by:
+        from warpsplat.svg.page import checked_unit, sheet_for  # brings what writes files
 
-        sheet_for(settings.size, settings.page, settings.units, 1, 1)
+        checked_unit(settings.units)
+        if settings.size or settings.page:
+            sheet_for(settings.size, settings.page, settings.units, 1, 1)
     return settings
 
 

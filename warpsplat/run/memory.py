@@ -17,6 +17,7 @@ from PIL import Image
 
 from warpsplat.errors import ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
+from warpsplat.files.resolution import resolution_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.problem import Fit
@@ -174,7 +175,8 @@ def facts_of(source: ImageSource, background: str = "auto") -> ImageFacts | None
         channels = 4 if source.ndim == 3 and source.shape[2] in {2, 4} else 3
         facts = ImageFacts(source.shape[1], source.shape[0], channels, 12, drafts=False)
     elif isinstance(source, Image.Image):
-        facts = ImageFacts(source.width, source.height, 4, 4, drafts=False)
+        stated = resolution_of(source)
+        facts = ImageFacts(source.width, source.height, 4, 4, drafts=False, resolution=stated)
     if facts and background != "auto":
         facts = replace(facts, channels=4 if background == "none" else 3)
     return facts

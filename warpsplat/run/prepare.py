@@ -41,6 +41,8 @@ class PreparedImage:
     """How the image was reduced to fit into memory; None if it was not."""
     name: str = "the image"
     """Its name in messages."""
+    resolution: tuple[float, float] | None = None
+    """That its file states [pixels an inch along x and y]."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -95,7 +97,9 @@ def prepare(
         notes += (no_effect(["importance"], chosen.subject),)
     if target.shape[2] == 4 and not target[..., 3].any():
         notes += ("every pixel is fully transparent, so the file is empty",)
-    prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, notes, reduction, name)
+    resolution = facts.resolution if facts else None
+    problem = Problem(target, chosen, loss=loss, metadata=key)
+    prepared = PreparedImage(problem, why, notes, reduction, name, resolution)
     if importance is None:
         return prepared
     mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1

@@ -13,7 +13,6 @@ from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
-from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
@@ -24,15 +23,13 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
+from warpsplat.run.paper import export_within, paper_for
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
-from warpsplat.scene import Scene
-from warpsplat.scene.geometry import most_seen
-from warpsplat.svg.page import placed
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -160,8 +157,9 @@ def make_result(
         release_memory()
         # A file that was cut short must not pass for a finished one.
         metadata = STOPPED if made.interrupted else problem.metadata
-        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata)
-        file = on_paper(svg, settings)
+        paper = paper_for(image, settings)
+        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata, paper)
+        file = paper(svg)
         if write:
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
@@ -186,7 +184,7 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=(*image.notes, *([optics.words()] if optics else [])),
+            notes=(*image.notes, *([optics.words()] if optics else []), *paper.notes()),
             optics=optics,
             history=tuple(history),
         )
@@ -223,24 +221,3 @@ def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
     except DeviceError as failure:
         run.failures.append(failure)
         return arranged(replace(made, interrupted=True), problem, strategy, run)
-
-
-def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """Return the SVG and its shapes: all, or those that show most if ``max_bytes`` allows no more."""
-
-    def made() -> tuple[str, int]:
-        text = finished(scene, settings, per_pixel, metadata)
-        return text, len(on_paper(text, settings).encode())
-
-    svg, size = made()
-    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
-        excess = 1 - settings.max_bytes / size
-        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
-        scene = most_seen(scene, len(scene) - count)
-        svg, size = made()
-    return svg, scene
-
-
-def on_paper(svg: str, settings: Settings) -> str:
-    """Return ``svg`` on the sheet that ``settings`` ask for, if any."""
-    return placed(svg, settings.size, settings.page, settings.units)
