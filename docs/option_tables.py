@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Subject
+from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Removal, Subject
 
 
 class RefineOptions(TypedDict, total=False):

@@ -27,6 +27,7 @@ EXCEPTIONS = {
     "portable/elementary.py": "**",  # powers of -1, which are whole numbers
     "portable/filters.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "drawing/denoise.py": "cv2.boxFilter",  # sums of whole numbers
+    "drawing/cut_out.py": "cv2.boxFilter",  # the same
     "drawing/trace/subject.py": "cv2.boxFilter",  # the same
     "drawing/trace/lattice.py": "@",  # sums of whole numbers
     "drawing/trace/grids.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
@@ -67,7 +68,7 @@ METHODS = words("""
 EXACT = words("""
     connectedComponents connectedComponentsWithStats findContours drawContours dilate erode morphologyEx
     getStructuringElement medianBlur fillPoly line circle ellipse polylines rectangle copyMakeBorder imdecode
-    applyColorMap ximgproc thinning boundingRect
+    applyColorMap ximgproc thinning boundingRect watershed
 """)
 """Functions of OpenCV that compute with integers, or only compare."""
 

@@ -36,6 +36,7 @@ Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 OpticsChoice = Literal["auto", "none"]
+Removal = Literal["outside", "everywhere"]
 LossName = Literal["l2", "ssim", "edges"]
 
 SUBJECTS = {
@@ -306,12 +307,16 @@ class Settings:
     seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
     background: str = option(
         "auto",
-        "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
+        "auto (transparent where the image is), none (--remove-background), or a colour such as '#fff'.",
         pattern=f"auto|none|(?i:{COLOR.pattern})",
         wanted=f"auto, none or a colour such as '#fff' ({QUOTED})",
         metavar="COLOR",
         parse=parse_background,
         refine=True,
+    )
+    remove_background: Removal | None = option(
+        None,
+        "Leave out the colour of the border: from there inwards, or also in holes such as those of letters.",
     )
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
@@ -426,6 +431,11 @@ class Settings:
     def limited_by(self) -> str:
         """Name of the option that limits the colours."""
         return "palette" if self.palette else "colors"
+
+    @property
+    def removal(self) -> Removal | None:
+        """Which background of an opaque image is removed, if any."""
+        return self.remove_background or ("outside" if self.background == "none" else None)
 
     @property
     def sized_by(self) -> str:

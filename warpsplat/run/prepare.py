@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warpsplat.drawing.cut_out import cut_out
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
@@ -78,10 +79,11 @@ def prepare(
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    facts = facts_of(source, settings.background)
+    facts = facts_of(source, "none" if settings.removal else settings.background)
     mask_facts = None if importance is None else facts_of(importance)
     first = factor_for(facts, settings, name, mask_facts)
-    target = load_target(source, name, settings.background, first)
+    target = image_of(source, name, paper=solid_color(settings.background), factor=first)
+    is_transparent = target.shape[2] == 4
     chosen, why, notes = choose_subject(target, settings, loss)
     gpu = None
     if backend and choose_strategy(chosen).uses_device:
@@ -91,6 +93,10 @@ def prepare(
         target = boxed(target, factor // first)
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
+    if chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
+        target, notes = without_background(target, chosen, notes)
+    if chosen.remove_background and is_transparent:
+        notes += ("the image is transparent, so that no background was removed",)
     if loss and chosen.subject != "photo":
         raise UsageError(f"subject {chosen.subject} and {OWN_LOSS} cannot be combined")
     if importance is not None and chosen.subject != "photo":
@@ -107,16 +113,27 @@ def prepare(
     return replace(prepared, problem=replace(prepared.problem, importance=mask))
 
 
-def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
-    """Read an image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
+    """Read an image to refine shapes against: with opacity, (height, width, 4), or on a colour.
 
-    ``factor``: how many times smaller to read it. Errors are those of ``image_of``.
+    ``background``: as in the settings. Errors are those of ``image_of``.
     """
-    color = solid_color(background)
-    image = image_of(source, name, paper=color, factor=factor)
+    image = image_of(source, name, paper=solid_color(background))
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
+
+
+def without_background(
+    target: FloatArray, settings: Settings, notes: tuple[str, ...]
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return a photograph without its background, and notes with one on that."""
+    cut = cut_out(target, everywhere=settings.removal == "everywhere")
+    left, color = cut[..., 3].mean(), solid_color(settings.background)
+    note = f"the background was removed, {1 - left:.0%} of the image"
+    if color is not None:
+        cut = np.asarray(cut[..., :3] + (1 - cut[..., 3:]) * color, np.float32)
+    return cut, (*notes, note)
 
 
 def load_image(image: ImageSource) -> FloatArray:

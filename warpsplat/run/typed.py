@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Subject
+from warpsplat.fit.settings import LossName, OpticsChoice, Painting, Quality, Removal, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -48,6 +48,7 @@ class Options(RefineOptions, total=False):
     detail: float | None
     optics: OpticsChoice | None
     seed: int | None
+    remove_background: Removal | None
     size: str | None
     page: str | None
     units: str | None

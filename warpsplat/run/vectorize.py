@@ -13,9 +13,10 @@ from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
+from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
@@ -30,6 +31,8 @@ from warpsplat.run.second_look import other_subject, retaken
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
+from warpsplat.scene import Scene
+from warpsplat.svg.numbers import hex_colors
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -159,7 +162,13 @@ def make_result(
         metadata = STOPPED if made.interrupted else problem.metadata
         paper = paper_for(image, settings)
         svg, scene = export_within(made.scene, settings, made.per_pixel, metadata, paper)
-        file = paper(svg)
+        file, notes = paper(svg), image.notes
+        if (
+            strategy.traces and problem.removes_background
+        ):  # only from the file, so that it is measured on its background
+            notes += (removal_note(scene, settings),)
+            scene = replace(scene, canvas=replace(scene.canvas, background=solid_color(settings.background)))
+            file = paper(finished(scene, settings, made.per_pixel, metadata))
         if write:
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
@@ -184,7 +193,7 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=(*image.notes, *([optics.words()] if optics else []), *paper.notes()),
+            notes=(*notes, *([optics.words()] if optics else []), *paper.notes()),
             optics=optics,
             history=tuple(history),
         )
@@ -221,3 +230,11 @@ def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
     except DeviceError as failure:
         run.failures.append(failure)
         return arranged(replace(made, interrupted=True), problem, strategy, run)
+
+
+def removal_note(scene: Scene, settings: Settings) -> str:
+    """Return the note that the background of a scene was removed."""
+    color = scene.canvas.background
+    named = "" if color is None else f", {hex_colors(color[None])[0]},"
+    where = "from the border inwards" if settings.removal == "outside" else "everywhere"
+    return f"the background{named} was removed {where}; the figures are those of the file on it"
