@@ -32,8 +32,8 @@ def opacity(result: Result) -> FloatArray:
 
 
 def distances() -> FloatArray:
-    y, x = np.mgrid[:64, :64] + 0.5
-    return np.hypot(x - 32, y - 32).astype(np.float32)
+    y, x = np.mgrid[:64, :64].astype(np.float32) + np.float32(0.5)
+    return np.sqrt(np.square(x - 32) + np.square(y - 32))
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError, cause_of
+from warpsplat.files.plugins import PLUGINS, plugin_formats
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.files.resolution import SWAPPED, Resolution, resolution_of
 from warpsplat.native import messages_hidden
@@ -87,7 +88,7 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
     except MemoryError:
         raise
     except UnidentifiedImageError:
-        formats = ", ".join(sorted(FORMATS))
+        formats = ", ".join(sorted([*FORMATS, *(plugin.format for plugin in PLUGINS)]))
         raise ImageError(f"{name}: not an image of a format that is read: {formats}") from None
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ImageError(f"{name}: too large: {TOO_LARGE}") from None
@@ -109,17 +110,18 @@ _decoding = threading.Lock()
 
 @contextlib.contextmanager
 def _opened(data: bytes) -> Iterator[Image.Image]:
-    """Open an image of ``FORMATS``, the only place that does; raises ``UnidentifiedImageError`` for others.
+    """Open an image of ``FORMATS`` or a plugin's; raises ``UnidentifiedImageError`` for others.
 
-    Pillow's limit is ``MAX_PIXELS`` in the block, and its warnings about odd metadata and those that libtiff
-    prints about any file are hidden.
+    The only place that does. Pillow's limit is ``MAX_PIXELS`` in the block, and its warnings about odd
+    metadata and those that libtiff prints about any file are hidden.
     """
     with _decoding, warnings.catch_warnings(), messages_hidden():
         warnings.simplefilter("ignore")
+        formats = plugin_formats(data) or FORMATS
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, MAX_PIXELS
         try:
-            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            with Image.open(io.BytesIO(data), formats=formats) as image:
                 yield image
         finally:
             Image.MAX_IMAGE_PIXELS = before
