@@ -27,7 +27,6 @@ EXCEPTIONS = {
     "portable/elementary.py": "**",  # powers of -1, which are whole numbers
     "portable/filters.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers
     "drawing/denoise.py": "cv2.boxFilter",  # sums of whole numbers
-    "drawing/cut_out.py": "cv2.boxFilter",  # the same
     "drawing/trace/subject.py": "cv2.boxFilter",  # the same
     "drawing/trace/lattice.py": "@",  # sums of whole numbers
     "drawing/trace/grids.py": "cv2.distanceTransformWithLabels",  # counts in whole numbers

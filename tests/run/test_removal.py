@@ -28,12 +28,13 @@ def made(image: object, subject: str, **options: Any) -> Result:
 
 
 def opacity(result: Result) -> FloatArray:
-    return np.asarray(render_own(result.svg).convert("RGBA"))[..., 3] / np.float32(255)
+    shown = np.asarray(render_own(result.svg).convert("RGBA"))[..., 3] / 255
+    return shown.astype(np.float32)
 
 
 def distances() -> FloatArray:
     y, x = np.mgrid[:64, :64].astype(np.float32) + np.float32(0.5)
-    return np.sqrt(np.square(x - 32) + np.square(y - 32))
+    return np.asarray(np.sqrt(np.square(x - 32) + np.square(y - 32)), np.float32)
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.plain_ground import find_ground
-from warpsplat.drawing.trace.grids import Bools, Floats, depth, eroded, nearest_in
+from warpsplat.drawing.trace.grids import Bools, Floats, depth, dilated, eroded, nearest_in
 from warpsplat.portable.filters import boxed, gaussian_blur, resize_linear
 from warpsplat.scene import FloatArray
 
@@ -41,9 +41,9 @@ def opacity_on_ground(image: FloatArray, *, everywhere: bool) -> FloatArray:
     height, width = image.shape[:2]
     factor = max(1, math.ceil(math.sqrt(height * width / MOST_PIXELS)))
     levels = 255 * (boxed(image, factor) if factor > 1 else image)
-    is_object = _objects(levels, ~find_ground(levels, everywhere=everywhere).mask)
+    shares = _objects(levels, ~find_ground(levels, everywhere=everywhere).mask)
     # Beyond the border of the image all goes on as it is there.
-    soft = gaussian_blur(is_object.astype(np.float32), SMOOTHING, "replicate")
+    soft = gaussian_blur(shares, SMOOTHING, "replicate")
     if factor > 1:
         soft = resize_linear(soft, (factor * soft.shape[1], factor * soft.shape[0]))
     # The smooth outline, with edges a pixel wide.
@@ -62,10 +62,11 @@ def cut_out(image: FloatArray, *, everywhere: bool) -> FloatArray:
     return np.concatenate([colors * opacity, opacity], axis=2)
 
 
-def _objects(levels: Floats, found: Bools) -> Bools:
-    """Return the pixels of objects, from those ``found`` to be no ground, which reach beyond their edges.
+def _objects(levels: Floats, found: Bools) -> Floats:
+    """Return the shares of objects in pixels.
 
-    Edges are where colours change most between what is surely ground and surely object: the watershed.
+    Those ``found`` to be no ground reach beyond the edges of objects. Edges are where colours change most
+    between what is surely ground and surely object: the watershed.
     """
     inside = depth(found)
     around = cv2.dilate(inside, np.ones((RIDGE_SIDE, RIDGE_SIDE), np.uint8))
@@ -76,14 +77,10 @@ def _objects(levels: Floats, found: Bools) -> Bools:
     framed = cv2.copyMakeBorder(soft, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     shown = cv2.watershed(framed, np.pad(marks, 1, mode="edge"))[1:-1, 1:-1]
     is_object = shown == OBJECT
-    is_object |= (shown == EDGE) & _most_around(is_object)
-    return _without_specks(_without_specks(is_object), holes=True)
-
-
-def _most_around(mask: Bools) -> Bools:
-    """Return the pixels of which most of those around them are in a mask."""
-    counts = cv2.boxFilter(mask.astype(np.uint8), cv2.CV_32S, (3, 3), normalize=False)
-    return np.asarray(counts > 3)
+    is_object = _without_specks(_without_specks(is_object), holes=True)
+    # The watershed is a line of pixels between both.
+    is_edge = (shown == EDGE) & dilated(is_object, 3) & ~is_object
+    return np.asarray(is_object + np.float32(0.5) * is_edge, np.float32)
 
 
 def _without_specks(mask: Bools, *, holes: bool = False) -> Bools:

@@ -33,7 +33,7 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
-Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
+Subject = Literal["auto", "photo", "drawing", "line", "pixel", "silhouette"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 OpticsChoice = Literal["auto", "none"]
 Removal = Literal["outside", "everywhere"]
@@ -44,6 +44,7 @@ SUBJECTS = {
     "drawing": "drawing",
     "line": "line drawing",
     "pixel": "piece of pixel art",
+    "silhouette": "silhouette",
 }
 """Subjects as messages call them."""
 
@@ -195,7 +196,9 @@ class Settings:
         elsewhere="ignored",
     )
     subject: Subject = option(
-        "auto", "Kind of image: photos are fitted with shapes, the other kinds are traced."
+        "auto",
+        "Kind of image: photos are fitted with shapes, the other kinds are traced; silhouette: outlines of"
+        " objects photographed on plain ground.",
     )
     kind: Kind = option(
         Kind.FILL,
@@ -468,6 +471,7 @@ class Settings:
         """Return the options given that have no effect on a subject."""
         if subject == "auto":
             return []
+        subject = "drawing" if subject == "silhouette" else subject  # as which it is drawn
         quality, found = self.quality, []
         for each in options_of(Settings):
             value = getattr(self, each.field)

@@ -57,7 +57,7 @@ SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 SHAPE = 24 << 10
 """Bytes per shape: its samples, densification, its text."""
 
-TRACED = {"drawing": 420, "line": 420, "pixel": 260}
+TRACED = {"drawing": 420, "line": 420, "silhouette": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
 
 LANES = 1 << 10

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.drawing.cut_out import cut_out
+from warpsplat.drawing.cut_out import MOST_PIXELS, cut_out
+from warpsplat.drawing.silhouette import silhouettes
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
+from warpsplat.files.image import ImageFacts
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import grid_scene
@@ -81,7 +83,8 @@ def prepare(
         key = job_key(settings, source, importance)
     facts = facts_of(source, "none" if settings.removal else settings.background)
     mask_facts = None if importance is None else facts_of(importance)
-    first = factor_for(facts, settings, name, mask_facts)
+    is_silhouette = settings.subject == "silhouette"
+    first = factor_for(facts, settings, name, mask_facts, silhouette_factor(facts) if is_silhouette else 1)
     target = image_of(source, name, paper=solid_color(settings.background), factor=first)
     is_transparent = target.shape[2] == 4
     chosen, why, notes = choose_subject(target, settings, loss)
@@ -93,7 +96,11 @@ def prepare(
         target = boxed(target, factor // first)
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
-    if chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
+    if is_silhouette:
+        target = silhouettes(target, name)
+        if facts and factor > 1:
+            reduction = Reduction(factor, facts.width, facts.height, None, "outlines need no more pixels")
+    elif chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
         target, notes = without_background(target, chosen, notes)
     if chosen.remove_background and is_transparent:
         notes += ("the image is transparent, so that no background was removed",)
@@ -122,6 +129,14 @@ def load_target(source: ImageSource, name: str | None, background: str) -> Float
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
+
+
+def silhouette_factor(facts: ImageFacts | None) -> int:
+    """Return how many times smaller an image is read for its silhouettes: a power of two."""
+    factor = 1
+    while facts and facts.width * facts.height > 2 * MOST_PIXELS * factor * factor:
+        factor *= 2
+    return factor
 
 
 def without_background(
