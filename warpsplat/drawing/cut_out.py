@@ -9,11 +9,11 @@ import numpy as np
 
 from warpsplat.drawing.plain_ground import find_ground
 from warpsplat.drawing.trace.grids import Bools, Floats, depth, dilated, eroded, nearest_in
-from warpsplat.portable.filters import boxed, gaussian_blur, resize_linear
+from warpsplat.portable.filters import boxed, gaussian_blur
 from warpsplat.scene import FloatArray
 
 MOST_PIXELS = 1_000_000
-"""Pixels of an image in which edges are looked for; more show noise."""
+"""Pixels of an image in which ground is looked for: a shadow begins gradually at this size."""
 
 CORE = 5.0
 """Distance from the ground from which on a pixel is surely none [px]; edges are less wide."""
@@ -24,7 +24,10 @@ RIDGE, RIDGE_SIDE = 0.75, 9
 LEAST_PART = 2e-4
 """Least part or hole, over the image: smaller ones are dust."""
 
-SMOOTHING = 1.5
+BLUR = 0.4
+"""Standard deviation by which noise is removed [px of that size]."""
+
+SMOOTHING = 2.0
 """Standard deviation by which outlines are smoothed, which are along pixels [px]."""
 
 GROUND, OBJECT, EDGE = 1, 2, -1
@@ -40,15 +43,14 @@ def opacity_on_ground(image: FloatArray, *, everywhere: bool) -> FloatArray:
     """
     height, width = image.shape[:2]
     factor = max(1, math.ceil(math.sqrt(height * width / MOST_PIXELS)))
-    levels = 255 * (boxed(image, factor) if factor > 1 else image)
-    shares = _objects(levels, ~find_ground(levels, everywhere=everywhere).mask)
+    levels = np.asarray(image, np.float32) * 255
+    found = ~find_ground(boxed(levels, factor) if factor > 1 else levels, everywhere=everywhere).mask
+    found = np.repeat(np.repeat(found, factor, axis=0), factor, axis=1)[:height, :width]
     # Beyond the border of the image all goes on as it is there.
-    soft = gaussian_blur(shares, SMOOTHING, "replicate")
-    if factor > 1:
-        soft = resize_linear(soft, (factor * soft.shape[1], factor * soft.shape[0]))
+    soft = gaussian_blur(_objects(levels, found, factor), SMOOTHING, "replicate")
     # The smooth outline, with edges a pixel wide.
-    width_of_edge = math.sqrt(2 * math.pi) * SMOOTHING * factor
-    return np.asarray(np.clip(width_of_edge * (soft[:height, :width] - 0.5) + 0.5, 0, 1), np.float32)
+    width_of_edge = math.sqrt(2 * math.pi) * SMOOTHING
+    return np.asarray(np.clip(width_of_edge * (soft - 0.5) + 0.5, 0, 1), np.float32)
 
 
 def cut_out(image: FloatArray, *, everywhere: bool) -> FloatArray:
@@ -62,17 +64,19 @@ def cut_out(image: FloatArray, *, everywhere: bool) -> FloatArray:
     return np.concatenate([colors * opacity, opacity], axis=2)
 
 
-def _objects(levels: Floats, found: Bools) -> Floats:
+def _objects(levels: Floats, found: Bools, factor: int) -> Floats:
     """Return the shares of objects in pixels.
 
     Those ``found`` to be no ground reach beyond the edges of objects. Edges are where colours change most
-    between what is surely ground and surely object: the watershed.
+    between what is surely ground and surely object: the watershed. ``factor``: pixels along one in which they
+    were found.
     """
     inside = depth(found)
-    around = cv2.dilate(inside, np.ones((RIDGE_SIDE, RIDGE_SIDE), np.uint8))
-    core = found & (inside > 1) & (inside >= np.minimum(CORE, RIDGE * around))
-    marks = np.where(eroded(~found, 3), GROUND, np.where(core, OBJECT, 0)).astype(np.int32)
-    soft = np.round(np.clip(gaussian_blur(np.asarray(levels, np.float32), 0.8), 0, 255)).astype(np.uint8)
+    side = RIDGE_SIDE * factor
+    around = cv2.dilate(inside, np.ones((side, side), np.uint8))
+    core = found & (inside > factor) & (inside >= np.minimum(CORE * factor, RIDGE * around))
+    marks = np.where(eroded(~found, 2 * factor + 1), GROUND, np.where(core, OBJECT, 0)).astype(np.int32)
+    soft = np.round(np.clip(gaussian_blur(levels, BLUR * factor), 0, 255)).astype(np.uint8)
     # The watershed leaves the border of an image open.
     framed = cv2.copyMakeBorder(soft, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     shown = cv2.watershed(framed, np.pad(marks, 1, mode="edge"))[1:-1, 1:-1]
