@@ -310,7 +310,7 @@ class Settings:
     seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
     background: str = option(
         "auto",
-        "auto (transparent where the image is), none (--remove-background), or a colour such as '#fff'.",
+        "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
         pattern=f"auto|none|(?i:{COLOR.pattern})",
         wanted=f"auto, none or a colour such as '#fff' ({QUOTED})",
         metavar="COLOR",
@@ -319,7 +319,8 @@ class Settings:
     )
     remove_background: Removal | None = option(
         None,
-        "Leave out the colour of the border: from there inwards, or also in holes such as those of letters.",
+        "Leave out the colour of the border: from there inwards, as --background none does, or also in holes,"
+        " such as those of letters.",
     )
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")

@@ -60,6 +60,9 @@ SHAPE = 24 << 10
 TRACED = {"drawing": 420, "line": 420, "silhouette": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
 
+CUT_OUT = 64
+"""Bytes per pixel of removing the background of a photograph."""
+
 LANES = 1 << 10
 """Bytes per slot that a GPU adds, twice with gradients: those of colours, by lane."""
 
@@ -102,6 +105,8 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
     reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
     traced = TRACED.get(settings.subject)
     working = traced * worked if traced else _fitting(facts, settings, factor)
+    if settings.removal and not traced:
+        working = max(working, CUT_OUT * worked)
     scoring = _scoring(facts, settings, worked)
     if mask:  # which is read beside the image, and held
         masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2

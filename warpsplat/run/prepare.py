@@ -102,6 +102,7 @@ def prepare(
             reduction = Reduction(factor, facts.width, facts.height, None, "outlines need no more pixels")
     elif chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
         target, notes = without_background(target, chosen, notes)
+        reduction = reduction and replace(reduction, whole=None)  # which has its background
     if chosen.remove_background and is_transparent:
         notes += ("the image is transparent, so that no background was removed",)
     if loss and chosen.subject != "photo":

@@ -54,6 +54,7 @@ def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
     target, notes = problem.target, (*image.notes, *notes)
     if subject == "photo" and problem.removes_background:
         target, notes = without_background(target, settings, notes)
+        image = replace(image, reduction=image.reduction and replace(image.reduction, whole=None))
     return replace(image, problem=replace(problem, settings=settings, target=target), why=why, notes=notes)
 
 
