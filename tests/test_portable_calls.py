@@ -67,7 +67,7 @@ METHODS = words("""
 EXACT = words("""
     connectedComponents connectedComponentsWithStats findContours drawContours dilate erode morphologyEx
     getStructuringElement medianBlur fillPoly line circle ellipse polylines rectangle copyMakeBorder imdecode
-    applyColorMap ximgproc thinning boundingRect
+    applyColorMap ximgproc thinning boundingRect watershed
 """)
 """Functions of OpenCV that compute with integers, or only compare."""
 

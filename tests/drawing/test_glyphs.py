@@ -133,9 +133,9 @@ def test_a_limit_that_does_not_bind_changes_nothing(quality: str, limit: dict[st
 def test_glyphs_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[int] = []
 
-    def find(image: FloatArray) -> tuple[Sheet | None, FloatArray]:
+    def find(image: FloatArray, *, removes_ground: bool) -> tuple[Sheet | None, FloatArray]:
         looked.append(1)
-        return find_glyphs(image)
+        return find_glyphs(image, removes_ground=removes_ground)
 
     monkeypatch.setattr(draw, "find_glyphs", find)
     warpsplat.vectorize(page(), subject="drawing", quality="draft", max_bytes=900)

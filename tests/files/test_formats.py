@@ -17,12 +17,13 @@ from tests.cli.helpers import one_line, run
 from tests.files.samples import load_image
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts
+from warpsplat.files.plugins import PLUGINS
 from warpsplat.files.sources import load_importance
 
 ENDLESS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 16 16\n%%EndComments\n{} loop\nshowpage\n%%EOF\n"
 """An endless PostScript program."""
 
-PIXELS = set(FORMATS) | {"MPO"}
+PIXELS = {*FORMATS, "MPO", *(plugin.format for plugin in PLUGINS)}
 """An MPO is a JPEG with others appended."""
 
 REFUSED = {
@@ -53,7 +54,8 @@ def test_postscript_is_run_by_nothing_that_reads_images(
     path.write_bytes(ENDLESS)
     assert run("vectorize", path, "-o", tmp_path / "x.svg") == ExitCode.INPUT
     assert "x.png: not an image of a format that is read: AVIF, BMP, " in one_line(capsys.readouterr().err)
-    message = rf"x\.png: not an image of a format that is read: {', '.join(sorted(FORMATS))}$"
+    names = ", ".join(sorted([*FORMATS, *(plugin.format for plugin in PLUGINS)]))
+    message = rf"x\.png: not an image of a format that is read: {names}$"
     for read in (
         lambda: load_image(path),
         lambda: load_image(ENDLESS, "x.png"),
@@ -98,4 +100,4 @@ def test_files_of_unknown_origin_are_opened_in_one_place() -> None:
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "Image.open"
     ]
-    assert calls == ["warpsplat/files/image.py: Image.open(io.BytesIO(data), formats=FORMATS)"]
+    assert calls == ["warpsplat/files/image.py: Image.open(io.BytesIO(data), formats=formats)"]

@@ -17,10 +17,10 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
+from warpsplat.run.paper import Paper
 from warpsplat.run.refine import refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
-from warpsplat.svg.page import placed
 from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.viewer import on_white, premultiplied, render_svg
 from warpsplat.svg.write import write_svg
@@ -114,7 +114,13 @@ SHEET = re.compile(r'<svg xmlns="\S+" width="(\S+)" height="(\S+)" viewBox="([^"
 
 @pytest.mark.parametrize(
     "sheet",
-    [{"page": "a4"}, {"size": "50x40mm"}, {"units": "in"}, {"page": "a5", "background": "none"}],
+    [
+        {"page": "a4"},
+        {"size": "50x40mm"},
+        {"units": "in"},
+        {"dpi": 200.0},
+        {"page": "a5", "background": "none"},
+    ],
     ids=str,
 )
 def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) -> None:
@@ -123,7 +129,7 @@ def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) ->
     settings = make_settings(curves=6, iterations=20, **sheet)
     scene = random_scene(Kind.FILL, count=6, width=48, height=36, seed=2)
     still = write_svg(scene, per_pixel=2, background=not sheet.get("background"))
-    text = placed(still, settings.size, settings.page, settings.units)
+    text = Paper(settings, (48, 36), (96, 96), "")(still)
     wanted, result = (improved(svg, target, settings, device)[0] for svg in (still, text))
     assert wanted.score and result.before
     assert scored(result).psnr == scored(wanted).psnr > result.before

@@ -10,7 +10,15 @@ import pytest
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.svg.page import Sheet, on_sheet, placed, sheet_for
+from warpsplat.svg.page import (
+    Sheet,
+    natural_sheet,
+    on_sheet,
+    on_sheet_of,
+    picture_view,
+    sheet_for,
+    with_own_size,
+)
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
@@ -38,7 +46,7 @@ def test_sizes_and_pages() -> None:
 @pytest.mark.parametrize(
     ("size", "page", "unit", "named"),
     [("200", "", "mm", "200x150mm"), ("0x10mm", "", "", "0x10mm"), ("99999x10mm", "", "", "99999x10mm")]
-    + [("1x1", "", "ell", "ell"), ("", "b9", "", "b9"), ("", "", "ell", "ell")],
+    + [("1x1", "", "ell", "ell"), ("", "b9", "", "b9")],
 )
 def test_invalid_options_are_named(size: str, page: str, unit: str, named: str) -> None:
     with pytest.raises(UsageError, match=named):
@@ -50,7 +58,16 @@ def test_a_picture_is_in_the_middle_of_its_sheet() -> None:
     text = on_sheet(picture(), Sheet(120, 150, 10))
     assert head(text) == ("120mm", "150mm", "-30 -125 360 450")
     assert text.split(">", 1)[1] == picture().split(">", 1)[1]
-    assert head(placed(picture(), "", "", "mm")) == ("15.875mm", "10.583mm", "0 0 300 200")
+
+
+def test_a_picture_of_its_own_size_fills_its_sheet() -> None:
+    sheet = natural_sheet(60, 40, (300, 300), "")
+    assert head(with_own_size(picture(), sheet)) == ("5.08mm", "3.38667mm", "0 0 300 200")
+    stretched = with_own_size(picture(), natural_sheet(60, 40, (300, 150), "in"))
+    assert head(stretched) == (".2in", '.266667in" preserveAspectRatio="none', "0 0 300 200")
+    view = picture_view(stretched, 60, 40)
+    assert view == "0 0 300 200"
+    assert on_sheet_of(stretched, view, picture()) == stretched
 
 
 def test_a_viewer_shows_it_in_the_middle() -> None:

@@ -13,7 +13,7 @@ from warpsplat.run.names import FoundImage
 
 ENDINGS = (
     *(".png", ".jpg", ".jpeg", ".jfif", ".webp", ".avif", ".gif", ".bmp", ".tif", ".tiff"),
-    *(".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
+    *(".heic", ".heif", ".jxl", ".ppm", ".pgm", ".pbm", ".pnm", ".tga", ".jp2", ".ico"),
 )
 """Endings of the files of a folder that are taken for images."""
 

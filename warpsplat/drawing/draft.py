@@ -60,7 +60,15 @@ def trace_in_time(
     def traced(factor: int, check: Callable[[], None]) -> Traced:
         small = boxed(image, factor) if factor > 1 else image
         gradients = DRAWN_GRADIENTS[settings.paint or "auto"]
-        found = trace(small, most=most, price=price, check=check, gradients=gradients, noise=noise)
+        found = trace(
+            small,
+            most=most,
+            price=price,
+            check=check,
+            gradients=gradients,
+            noise=noise,
+            removal=settings.removal,
+        )
         return replace(found, scene=enlarged(found.scene, factor, width, height))
 
     least = math.ceil(np.sqrt(height * width / QUICK_PIXELS))
@@ -72,8 +80,9 @@ def trace_in_time(
 
 def draw_pixels(problem: Problem, run: Run) -> Fit:
     """Trace pixel art, a shape for each area of cells of one colour."""
-    scene, per_pixel = trace_pixels(problem.target, solid_color(problem.settings.background))
-    scene = limited(scene, problem.settings)
+    settings = problem.settings
+    scene, per_pixel = trace_pixels(problem.target, solid_color(settings.background), settings.removal)
+    scene = limited(scene, settings)
     return replace(as_fit(scene, per_pixel, problem, run), interrupted=False)
 
 

@@ -135,9 +135,13 @@ def _traced(
             drawing = drawing.take(solid_shapes(drawing.scene))
         return replace(drawing, scene=limited(drawing.scene, settings))
 
-    sheet, rest = find_glyphs(picture.pixels) if has_sheet else (None, picture.pixels)
+    # On a sheet without its ground, holes are empty.
+    has_sheet = has_sheet and settings.removal != "outside"
+    sheet, rest = None, picture.pixels
+    if has_sheet:
+        sheet, rest = find_glyphs(picture.pixels, removes_ground=settings.removal is not None)
     if sheet:
-        glyphs, others = sheet.trace(), trace(rest, None)
+        glyphs, others = sheet.trace(settings.removal), trace(rest, None)
         scene = sheet.placed(glyphs.scene, others.scene)
         if most is None or len(scene) <= most:
             return _Trace(others, rest, scene, sheet, Drawing(glyphs.scene, glyphs.joints))

@@ -43,8 +43,8 @@ class Sheet:
     places: Ints
     """Upper left corner of each copy in the image, shape (copy, 2)."""
 
-    def trace(self) -> Traced:
-        """Trace the sheet."""
+    def trace(self, removal: str | None = None) -> Traced:
+        """Trace the sheet; with ``removal``, as for ``trace.trace``, holes of glyphs are empty."""
         levels = np.asarray(self.image, np.float32) * 255
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
         painted = (levels[..., 0] < 128).astype(np.int32)
@@ -52,7 +52,7 @@ class Sheet:
         colors = np.array([[255, 255, 255, 255], [0, 0, 0, 255]], np.float64)
         fills = colors.astype(np.float32)[painted]
         regions = Regions(levels, labels, fills, paint, [Coloring(color) for color in colors], 0.0)
-        return trace_partition(find_partition(regions))
+        return trace_partition(find_partition(regions), removal=removal)
 
     def placed(self, drawn: Scene, rest: Scene) -> Scene:
         """Return the whole image's scene, of the sheet's and that of the rest."""

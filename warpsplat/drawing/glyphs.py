@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.drawing.glyph_sheet import Sheet, packed
-from warpsplat.drawing.trace.grids import NO_REGION, dilated, linked_components, nearest_in
+from warpsplat.drawing.trace.grids import NO_REGION, border, dilated, linked_components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED
 from warpsplat.drawing.trace.regions import NEGLIGIBLE_NOISE
 from warpsplat.drawing.trace.seeds import noise_of
-from warpsplat.drawing.trace.trace import LEAST_AREA
+from warpsplat.drawing.trace.trace import ALIKE, LEAST_AREA
 from warpsplat.scene import FloatArray
 
 LEAST_GROUND = 400
@@ -71,14 +71,19 @@ class _Glyph:
         return np.round(np.concatenate([self.ground, self.extreme])).tobytes()
 
 
-def find_glyphs(image: FloatArray) -> tuple[Sheet | None, FloatArray]:
+def find_glyphs(image: FloatArray, *, removes_ground: bool = False) -> tuple[Sheet | None, FloatArray]:
     """Return the sheet of an image's glyphs, if there are enough, and the image without them.
 
-    An image with noise has none. ``image``: as for ``trace``.
+    An image with noise has none. ``image``: as for ``trace``; ``removes_ground``: whether what has the colour
+    of its border will be empty, and so is no glyph.
     """
     glyphs = _different_glyphs(image)
     inks = _inks(glyphs)
     glyphs = [glyph for glyph in glyphs if glyph.key in inks]
+    if removes_ground and glyphs:
+        edge, counts = np.unique(border(image), axis=0, return_counts=True)
+        empty = 255 * edge[counts.argmax()]
+        glyphs = [g for g in glyphs if np.abs(g.ground + inks[g.key] - empty).max() > ALIKE]
     if sum(len(glyph.copies) for glyph in glyphs) < FEWEST:
         return None, image
     rest = image.copy()

@@ -53,7 +53,7 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     settings = problem.settings
     ink = find_ink(problem.target, mixed=settings.mixed)
     color = solid_color(settings.background)
-    if color is not None or settings.background == "none":
+    if color is not None:
         ink = replace(ink, paper=color)
     traced = trace_ink(ink, mixed=settings.mixed)
     if not traced.lines and not traced.areas:

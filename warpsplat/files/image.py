@@ -19,7 +19,9 @@ import numpy.typing as npt
 from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from warpsplat.errors import ImageError, cause_of
+from warpsplat.files.plugins import PLUGINS, plugin_formats
 from warpsplat.files.profile import Profile, profile_of
+from warpsplat.files.resolution import SWAPPED, Resolution, resolution_of
 from warpsplat.native import messages_hidden
 from warpsplat.portable.filters import boxed
 from warpsplat.portable.sequences import interp
@@ -86,7 +88,7 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
     except MemoryError:
         raise
     except UnidentifiedImageError:
-        formats = ", ".join(sorted(FORMATS))
+        formats = ", ".join(sorted([*FORMATS, *(plugin.format for plugin in PLUGINS)]))
         raise ImageError(f"{name}: not an image of a format that is read: {formats}") from None
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ImageError(f"{name}: too large: {TOO_LARGE}") from None
@@ -108,17 +110,18 @@ _decoding = threading.Lock()
 
 @contextlib.contextmanager
 def _opened(data: bytes) -> Iterator[Image.Image]:
-    """Open an image of ``FORMATS``, the only place that does; raises ``UnidentifiedImageError`` for others.
+    """Open an image of ``FORMATS`` or a plugin's; raises ``UnidentifiedImageError`` for others.
 
-    Pillow's limit is ``MAX_PIXELS`` in the block, and its warnings about odd metadata and those that libtiff
-    prints about any file are hidden.
+    The only place that does. Pillow's limit is ``MAX_PIXELS`` in the block, and its warnings about odd
+    metadata and those that libtiff prints about any file are hidden.
     """
     with _decoding, warnings.catch_warnings(), messages_hidden():
         warnings.simplefilter("ignore")
+        formats = plugin_formats(data) or FORMATS
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, MAX_PIXELS
         try:
-            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            with Image.open(io.BytesIO(data), formats=formats) as image:
                 yield image
         finally:
             Image.MAX_IMAGE_PIXELS = before
@@ -219,6 +222,8 @@ class ImageFacts:
     """Bytes a pixel of the whole image that decoding takes at any size."""
     deep: bool = False
     """See ``is_deep``."""
+    resolution: Resolution | None = None
+    """That the file states, if it does."""
 
 
 def image_facts(source: bytes) -> ImageFacts | None:
@@ -231,11 +236,12 @@ def image_facts(source: bytes) -> ImageFacts | None:
             taken = taken * (2 if orientation != 1 else 1) + (0 if image.format in PLAIN_FORMATS else 8)
             if is_deep(image):  # all of it is held as floats
                 taken += 16
-            if orientation in range(5, 9):
+            if orientation in SWAPPED:
                 width, height = height, width
             kept = 6 if image.info.get("progressive") else 0  # the coefficients of a progressive JPEG
             channels = 4 if _is_transparent(image) else 3
-            return ImageFacts(width, height, channels, taken, image.format == "JPEG", kept, is_deep(image))
+            drafts, resolution = image.format == "JPEG", resolution_of(image)
+            return ImageFacts(width, height, channels, taken, drafts, kept, is_deep(image), resolution)
     except Exception:  # Pillow's decoders raise nearly every kind of exception on broken data
         return None
 

@@ -49,7 +49,7 @@ def finished(scene: Scene, settings: Settings, per_pixel: float, metadata: str =
     if settings.minify:
         return minified(text)
     # Sheets are built from the usual head.
-    return text if settings.size or settings.page or settings.units else shortened(text)
+    return text if settings.sized_by else shortened(text)
 
 
 def shown_paths(scene: Scene, settings: Settings) -> Scene:

@@ -41,6 +41,11 @@ class Problem:
         """Width and height of the image [px]."""
         return self.target.shape[1], self.target.shape[0]
 
+    @property
+    def removes_background(self) -> bool:
+        """Whether the file of a traced image is without its background."""
+        return self.settings.removal is not None and self.target.shape[2] == 3
+
     def having(self, **settings: Any) -> Problem:
         """Return the problem with some settings changed."""
         return replace(self, settings=replace(self.settings, **settings))

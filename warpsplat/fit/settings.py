@@ -33,10 +33,11 @@ from warpsplat.scene import ATTRIBUTES, Basis, FloatArray, Kind
 
 Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
-Subject = Literal["auto", "photo", "drawing", "line", "pixel"]
+Subject = Literal["auto", "photo", "drawing", "line", "pixel", "silhouette"]
 Painting = Literal["flat", "linear", "radial", "auto"]
 OpticsChoice = Literal["auto", "none"]
 Stack = Literal["overlap", "cutout"]
+Removal = Literal["outside", "everywhere"]
 LossName = Literal["l2", "ssim", "edges"]
 DxfCurves = Literal["arcs", "splines", "lines", "r12"]
 
@@ -45,6 +46,7 @@ SUBJECTS = {
     "drawing": "drawing",
     "line": "line drawing",
     "pixel": "piece of pixel art",
+    "silhouette": "silhouette",
 }
 """Subjects as messages call them."""
 
@@ -196,7 +198,9 @@ class Settings:
         elsewhere="ignored",
     )
     subject: Subject = option(
-        "auto", "Kind of image: photos are fitted with shapes, the other kinds are traced."
+        "auto",
+        "Kind of image: photos are fitted with shapes, the other kinds are traced; silhouette: outlines of"
+        " objects photographed on plain ground.",
     )
     kind: Kind = option(
         Kind.FILL,
@@ -315,10 +319,26 @@ class Settings:
         parse=parse_background,
         refine=True,
     )
+    remove_background: Removal | None = option(
+        None,
+        "Leave out the colour of the border: from there inwards, as --background none does, or also in holes,"
+        " such as those of letters.",
+    )
     title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
     page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
-    units: str = option("", "Unit of the size in the file: mm, cm, in, pt, px.", metavar="UNIT")
+    units: str = option(
+        "",
+        "Unit of the size in the file, which follows from the image's resolution: mm, cm, in, pt; or px.",
+        metavar="UNIT",
+    )
+    dpi: float | None = option(
+        None,
+        "Resolution of the image in pixels an inch, for its size in the file.",
+        (1, 1e6),
+        shown_default="that in the image file, else 96",
+        metavar="N",
+    )
     dxf: DxfCurves = option(
         "arcs",
         "Curves in a .dxf: arcs; splines; lines, for OpenSCAD; r12: lines, for old programs.",
@@ -433,6 +453,17 @@ class Settings:
         return "palette" if self.palette else "colors"
 
     @property
+    def removal(self) -> Removal | None:
+        """Which background of an opaque image is removed, if any."""
+        return self.remove_background or ("outside" if self.background == "none" else None)
+
+    @property
+    def sized_by(self) -> str:
+        """Name of an option that gives the file a size on paper; empty: none."""
+        options = (("size", self.size), ("page", self.page), ("dpi", self.dpi), ("units", self.units))
+        return next((name for name, value in options if value), "")
+
+    @property
     def counting(self) -> list[str]:
         """Names of the options given, other than ``curves``, that decide the number of shapes."""
         given = (("levels", self.levels), ("target-psnr", self.target_psnr), ("max-bytes", self.max_bytes))
@@ -457,6 +488,7 @@ class Settings:
         """Return the options given that have no effect on a subject."""
         if subject == "auto":
             return []
+        subject = "drawing" if subject == "silhouette" else subject  # as which it is drawn
         quality, found = self.quality, []
         for each in options_of(Settings):
             value = getattr(self, each.field)
@@ -513,6 +545,8 @@ RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
     ),
     (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} cannot be combined"),
     (lambda s: s.size and s.page, "size and page cannot be combined"),
+    (lambda s: s.dpi and (s.size or s.page), "dpi and {0.sized_by} cannot be combined"),
+    (lambda s: s.dpi and s.units == "px", "dpi and units px cannot be combined"),
 )
 """Contradictions: whether settings have one, and its message, in which ``{0}`` stands for them. Those with a
 subject follow from ``Option.subjects``, those with a renderer from ``FitRenderer.check``."""
@@ -553,10 +587,12 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
-    if settings.size or settings.page or settings.units:
-        from warpsplat.svg.page import sheet_for  # brings what writes files
+    if settings.sized_by:
+        from warpsplat.svg.page import checked_unit, sheet_for  # brings what writes files
 
-        sheet_for(settings.size, settings.page, settings.units, 1, 1)
+        checked_unit(settings.units)
+        if settings.size or settings.page:
+            sheet_for(settings.size, settings.page, settings.units, 1, 1)
     return settings
 
 

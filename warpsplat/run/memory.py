@@ -17,6 +17,7 @@ from PIL import Image
 
 from warpsplat.errors import ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
+from warpsplat.files.resolution import resolution_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.problem import Fit
@@ -56,8 +57,11 @@ SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 SHAPE = 24 << 10
 """Bytes per shape: its samples, densification, its text."""
 
-TRACED = {"drawing": 420, "line": 420, "pixel": 260}
+TRACED = {"drawing": 420, "line": 420, "silhouette": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
+
+CUT_OUT = 64
+"""Bytes per pixel of removing the background of a photograph."""
 
 LANES = 1 << 10
 """Bytes per slot that a GPU adds, twice with gradients: those of colours, by lane."""
@@ -101,6 +105,8 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
     reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
     traced = TRACED.get(settings.subject)
     working = traced * worked if traced else _fitting(facts, settings, factor)
+    if settings.removal and not traced:
+        working = max(working, CUT_OUT * worked)
     scoring = _scoring(facts, settings, worked)
     if mask:  # which is read beside the image, and held
         masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2
@@ -174,7 +180,8 @@ def facts_of(source: ImageSource, background: str = "auto") -> ImageFacts | None
         channels = 4 if source.ndim == 3 and source.shape[2] in {2, 4} else 3
         facts = ImageFacts(source.shape[1], source.shape[0], channels, 12, drafts=False)
     elif isinstance(source, Image.Image):
-        facts = ImageFacts(source.width, source.height, 4, 4, drafts=False)
+        stated = resolution_of(source)
+        facts = ImageFacts(source.width, source.height, 4, 4, drafts=False, resolution=stated)
     if facts and background != "auto":
         facts = replace(facts, channels=4 if background == "none" else 3)
     return facts

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warpsplat.drawing.cut_out import MOST_PIXELS, cut_out
+from warpsplat.drawing.silhouette import silhouettes
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError
+from warpsplat.files.image import ImageFacts
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
 from warpsplat.fit.custom_loss import CustomLoss
 from warpsplat.fit.place import grid_scene
@@ -41,6 +44,8 @@ class PreparedImage:
     """How the image was reduced to fit into memory; None if it was not."""
     name: str = "the image"
     """Its name in messages."""
+    resolution: tuple[float, float] | None = None
+    """That its file states [pixels an inch along x and y]."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -76,10 +81,12 @@ def prepare(
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    facts = facts_of(source, settings.background)
+    facts = facts_of(source, "none" if settings.removal else settings.background)
     mask_facts = None if importance is None else facts_of(importance)
-    first = factor_for(facts, settings, name, mask_facts)
-    target = load_target(source, name, settings.background, first)
+    is_silhouette = settings.subject == "silhouette"
+    first = factor_for(facts, settings, name, mask_facts, silhouette_factor(facts) if is_silhouette else 1)
+    target = image_of(source, name, paper=solid_color(settings.background), factor=first)
+    is_transparent = target.shape[2] == 4
     chosen, why, notes = choose_subject(target, settings, loss)
     gpu = None
     if backend and choose_strategy(chosen).uses_device:
@@ -89,13 +96,24 @@ def prepare(
         target = boxed(target, factor // first)
     release_memory()
     reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
+    if is_silhouette:
+        target = silhouettes(target, name)
+        if facts and factor > 1:
+            reduction = Reduction(factor, facts.width, facts.height, None, "outlines need no more pixels")
+    elif chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
+        target, notes = without_background(target, chosen, notes)
+        reduction = reduction and replace(reduction, whole=None)  # which has its background
+    if chosen.remove_background and is_transparent:
+        notes += ("the image is transparent, so that no background was removed",)
     if loss and chosen.subject != "photo":
         raise UsageError(f"subject {chosen.subject} and {OWN_LOSS} cannot be combined")
     if importance is not None and chosen.subject != "photo":
         notes += (no_effect(["importance"], chosen.subject),)
     if target.shape[2] == 4 and not target[..., 3].any():
         notes += ("every pixel is fully transparent, so the file is empty",)
-    prepared = PreparedImage(Problem(target, chosen, loss=loss, metadata=key), why, notes, reduction, name)
+    resolution = facts.resolution if facts else None
+    problem = Problem(target, chosen, loss=loss, metadata=key)
+    prepared = PreparedImage(problem, why, notes, reduction, name, resolution)
     if importance is None:
         return prepared
     mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1
@@ -103,16 +121,35 @@ def prepare(
     return replace(prepared, problem=replace(prepared.problem, importance=mask))
 
 
-def load_target(source: ImageSource, name: str | None, background: str, factor: int = 1) -> FloatArray:
-    """Read an image as ``Settings.background`` asks for it: with opacity, (height, width, 4), or on a colour.
+def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
+    """Read an image to refine shapes against: with opacity, (height, width, 4), or on a colour.
 
-    ``factor``: how many times smaller to read it. Errors are those of ``image_of``.
+    ``background``: as in the settings. Errors are those of ``image_of``.
     """
-    color = solid_color(background)
-    image = image_of(source, name, paper=color, factor=factor)
+    image = image_of(source, name, paper=solid_color(background))
     if background == "none" and image.shape[2] == 3:
         image = np.concatenate([image, np.ones_like(image[..., :1])], axis=2)
     return image
+
+
+def silhouette_factor(facts: ImageFacts | None) -> int:
+    """Return how many times smaller an image is read for its silhouettes: a power of two."""
+    factor = 1
+    while facts and facts.width * facts.height > 2 * MOST_PIXELS * factor * factor:
+        factor *= 2
+    return factor
+
+
+def without_background(
+    target: FloatArray, settings: Settings, notes: tuple[str, ...]
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return a photograph without its background, and notes with one on that."""
+    cut = cut_out(target, everywhere=settings.removal == "everywhere")
+    left, color = cut[..., 3].mean(), solid_color(settings.background)
+    note = f"the background was removed, {1 - left:.0%} of the image"
+    if color is not None:
+        cut = np.asarray(cut[..., :3] + (1 - cut[..., 3:]) * color, np.float32)
+    return cut, (*notes, note)
 
 
 def load_image(image: ImageSource) -> FloatArray:

@@ -11,7 +11,7 @@ from warpsplat.fit.settings import SUBJECTS, Subject, make_settings
 from warpsplat.metrics import psnr_of_file
 from warpsplat.portable.filters import resize_area, resize_linear
 from warpsplat.run.explained import explained, psnr_of
-from warpsplat.run.prepare import PreparedImage, choose_subject
+from warpsplat.run.prepare import PreparedImage, choose_subject, without_background
 from warpsplat.scene import FloatArray
 
 NEXT: dict[Subject, Subject] = {"pixel": "drawing", "drawing": "photo"}
@@ -51,7 +51,11 @@ def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
     problem, was = image.problem, image.problem.settings.subject
     settings, _, notes = choose_subject(problem.target, replace(problem.settings, subject=subject))
     why = f"as a {SUBJECTS[was]} it would show too little of the image"
-    return replace(image, problem=replace(problem, settings=settings), why=why, notes=(*image.notes, *notes))
+    target, notes = problem.target, (*image.notes, *notes)
+    if subject == "photo" and problem.removes_background:
+        target, notes = without_background(target, settings, notes)
+        image = replace(image, reduction=image.reduction and replace(image.reduction, whole=None))
+    return replace(image, problem=replace(problem, settings=settings, target=target), why=why, notes=notes)
 
 
 def _thumbnail_psnr(target: FloatArray, size: tuple[int, int]) -> float:

@@ -32,7 +32,7 @@ MOST_NUMBERS = 16
 """Most numbers of shapes in one run."""
 
 
-OWN_NUMBER = {"line", "pixel"}
+OWN_NUMBER = {"line", "pixel", "silhouette"}
 """Subjects whose images decide how many shapes there are."""
 
 

@@ -51,6 +51,7 @@ STRATEGIES = {
         "warpsplat.drawing.draw:draw_regions", keeps_order=True, traces=True, uses_device=False
     ),
     "line": Strategy("warpsplat.drawing.line_art:draw_lines", keeps_order=True, traces=True),
+    "silhouette": Strategy("warpsplat.drawing.silhouette:draw_silhouettes", keeps_order=True, traces=True),
     "pixel": Strategy(
         "warpsplat.drawing.draft:draw_pixels", keeps_order=True, traces=True, uses_device=False
     ),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import DxfCurves, LossName, OpticsChoice, Painting, Quality, Stack, Subject
+from warpsplat.fit.settings import DxfCurves, LossName, OpticsChoice, Painting, Quality, Removal, Stack, Subject
 
 
 class RefineOptions(TypedDict, total=False):
@@ -52,8 +52,10 @@ class Options(RefineOptions, total=False):
     detail: float | None
     optics: OpticsChoice | None
     seed: int | None
+    remove_background: Removal | None
     size: str | None
     page: str | None
     units: str | None
+    dpi: float | None
     symbols: bool | None
     strokes: bool | None

@@ -16,7 +16,7 @@ from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
-from warpsplat.fit.settings import Settings
+from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
@@ -24,6 +24,7 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
+from warpsplat.run.paper import export_within, paper_for
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
@@ -31,8 +32,7 @@ from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_stra
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene
-from warpsplat.scene.geometry import most_seen
-from warpsplat.svg.page import placed
+from warpsplat.svg.numbers import hex_colors
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -160,8 +160,15 @@ def make_result(
         release_memory()
         # A file that was cut short must not pass for a finished one.
         metadata = STOPPED if made.interrupted else problem.metadata
-        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata)
-        file = on_paper(svg, settings)
+        paper = paper_for(image, settings)
+        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata, paper)
+        file, notes = paper(svg), image.notes
+        if (
+            strategy.traces and problem.removes_background
+        ):  # only from the file, so that it is measured on its background
+            notes += (removal_note(scene, settings),)
+            scene = replace(scene, canvas=replace(scene.canvas, background=solid_color(settings.background)))
+            file = paper(finished(scene, settings, made.per_pixel, metadata))
         if write:
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
@@ -186,7 +193,7 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=(*image.notes, *([optics.words()] if optics else [])),
+            notes=(*notes, *([optics.words()] if optics else []), *paper.notes()),
             optics=optics,
             history=tuple(history),
         )
@@ -225,22 +232,9 @@ def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
         return arranged(replace(made, interrupted=True), problem, strategy, run)
 
 
-def export_within(scene: Scene, settings: Settings, per_pixel: float, metadata: str) -> tuple[str, Scene]:
-    """Return the SVG and its shapes: all, or those that show most if ``max_bytes`` allows no more."""
-
-    def made() -> tuple[str, int]:
-        text = finished(scene, settings, per_pixel, metadata)
-        return text, len(on_paper(text, settings).encode())
-
-    svg, size = made()
-    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
-        excess = 1 - settings.max_bytes / size
-        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
-        scene = most_seen(scene, len(scene) - count)
-        svg, size = made()
-    return svg, scene
-
-
-def on_paper(svg: str, settings: Settings) -> str:
-    """Return ``svg`` on the sheet that ``settings`` ask for, if any."""
-    return placed(svg, settings.size, settings.page, settings.units)
+def removal_note(scene: Scene, settings: Settings) -> str:
+    """Return the note that the background of a scene was removed."""
+    color = scene.canvas.background
+    named = "" if color is None else f", {hex_colors(color[None])[0]},"
+    where = "from the border inwards" if settings.removal == "outside" else "everywhere"
+    return f"the background{named} was removed {where}; the figures are those of the file on it"

@@ -1,4 +1,4 @@
-"""Files as large as a sheet of paper, for plotters and printers."""
+"""Files with a size on paper: that of a sheet, for plotters and printers, or the picture's own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import number
 from warpsplat.svg.write import GRIDS, MARK, head_of, own_head
 
-MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "px": 25.4 / 96}
+INCH = 25.4
+"""Length of an inch [mm]."""
+
+PIXELS_AN_INCH = 96.0
+"""Of CSS, for images without a resolution."""
+
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": INCH, "pt": INCH / 72, "px": INCH / PIXELS_AN_INCH}
 """Length of a CSS unit [mm]."""
 
 PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "letter": (215.9, 279.4)}
@@ -24,8 +30,11 @@ MARGIN = 10.0
 LARGEST = 10_000.0
 """Longest side of a sheet [mm]."""
 
+STRETCHED = 'preserveAspectRatio="none"'
+"""Attribute of a picture whose pixels are no squares."""
+
 VIEW = re.compile(
-    rf'<svg xmlns="{re.escape(NAMESPACE)}" (width="[\d.]+[a-z]+" height="[\d.]+[a-z]+") '
+    rf'<svg xmlns="{re.escape(NAMESPACE)}" (width="[\d.]+[a-z]+" height="[\d.]+[a-z]+"(?: {STRETCHED})?) '
     r'viewBox="(-?[\d.]+) (-?[\d.]+) ([\d.]+) ([\d.]+)"'
 )
 """The beginning of a file on a sheet: the sheet's size, and its box in units of the file."""
@@ -36,7 +45,10 @@ OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
 
 DECIMALS = 3
-"""Decimals of sizes and boxes."""
+"""Decimals of boxes."""
+
+DIGITS, MOST_DECIMALS = 6, 12
+"""Significant digits of sizes, and how many of them may be decimals."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +64,12 @@ class Sheet:
     unit: str = "mm"
     """Unit of the size in the file."""
 
+    def lengths(self) -> tuple[str, str]:
+        """Return width and height in the unit, as texts."""
+        sides = (side / MILLIMETRES[self.unit] for side in (self.width, self.height))
+        width, height = (number(float(f"{side:.{DIGITS}g}"), MOST_DECIMALS) for side in sides)
+        return width, height
+
 
 def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet:
     """Return the sheet that options ask for.
@@ -60,17 +78,13 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
         size: A size such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Empty: none.
         page: A standard format, with margins, in landscape for a picture wider than high. Empty: none.
         unit: Unit of the size in the file; empty: millimetres.
-        width: Width of the picture [px], its own size if there is neither a size nor a page.
-        height: Height of the picture [px].
+        width: Width of the picture.
+        height: Height of the picture.
 
     Raises:
         UsageError: An option is invalid.
     """
-    if unit and unit not in MILLIMETRES:
-        raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {shown(unit)}")
-    unit = unit or "mm"
-    if not size and not page:
-        return Sheet(width * MILLIMETRES["px"], height * MILLIMETRES["px"], unit=unit)
+    unit = checked_unit(unit)
     if not size:
         if page.lower() not in PAGES:
             raise UsageError(f"page must be one of {', '.join(PAGES)}, not {shown(page)}")
@@ -86,15 +100,30 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     return Sheet(sides[0], sides[1], unit=unit)
 
 
-def placed(text: str, size: str, page: str, unit: str) -> str:
-    """Return a file written here, as large as options ask for; arguments and errors as ``sheet_for``."""
-    if not (size or page or unit):
-        return text
+def checked_unit(unit: str) -> str:
+    """Return a unit, millimetres if it is empty; raise ``UsageError`` for one that is unknown."""
+    if unit and unit not in MILLIMETRES:
+        raise UsageError(f"units must be one of {', '.join(MILLIMETRES)}, not {shown(unit)}")
+    return unit or "mm"
+
+
+def natural_sheet(width: int, height: int, resolution: tuple[float, float], unit: str) -> Sheet:
+    """Return a sheet of a picture's own size [px], in a unit as ``sheet_for``.
+
+    ``resolution``: pixels an inch along x and y, without effect on a size in ``px``.
+    """
+    unit = checked_unit(unit)
+    across, down = (PIXELS_AN_INCH, PIXELS_AN_INCH) if unit == "px" else resolution
+    return Sheet(INCH * width / across, INCH * height / down, unit=unit)
+
+
+def with_own_size(text: str, sheet: Sheet) -> str:
+    """Return a file written here that fills a sheet; pixels are no squares if its proportions are others."""
     head = own_head(text)
-    sheet = sheet_for(size, page, unit, int(head[1]), int(head[2]))
-    if size or page:
-        return on_sheet(text, sheet)
-    return _with_head(text, _attributes(sheet), (0, 0, float(head[3]), float(head[4])))
+    width, height = int(head[1]), int(head[2])
+    is_square = math.isclose(sheet.width * height, sheet.height * width, rel_tol=1e-9)
+    size = _attributes(sheet) + ("" if is_square else f" {STRETCHED}")
+    return _with_head(text, size, (0, 0, float(head[3]), float(head[4])))
 
 
 def on_sheet(text: str, sheet: Sheet) -> str:
@@ -112,10 +141,8 @@ def on_sheet(text: str, sheet: Sheet) -> str:
 
 def _attributes(sheet: Sheet) -> str:
     """Return the size of a sheet as attributes."""
-    width, height = (
-        number(side / MILLIMETRES[sheet.unit], DECIMALS) + sheet.unit for side in (sheet.width, sheet.height)
-    )
-    return f'width="{width}" height="{height}"'
+    width, height = sheet.lengths()
+    return f'width="{width}{sheet.unit}" height="{height}{sheet.unit}"'
 
 
 def _with_head(text: str, size: str, view: Iterable[float]) -> str:

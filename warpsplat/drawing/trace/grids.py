@@ -79,6 +79,11 @@ def at_pixels(values: npt.NDArray[Any], points: Floats) -> npt.NDArray[Any]:
     return values[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
 
 
+def border(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the values along the border of an image, those of corners twice."""
+    return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
+
+
 class Sets:
     """Disjoint sets of 0 .. count - 1 (union-find)."""
 

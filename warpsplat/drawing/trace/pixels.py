@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from warpsplat.alpha import straight
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, linked_components
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, border, linked_components
 from warpsplat.drawing.trace.lattice import MOST_COLORS, Cells, find_lattice
 from warpsplat.drawing.trace.planar import find_loops
 from warpsplat.errors import ImageError
@@ -83,12 +84,15 @@ def _lines(corners: Ints, cells: Cells) -> Floats:
     return np.stack([start, start + way / 3, start + way * 2 / 3], axis=1).reshape(-1, 2)
 
 
-def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tuple[Scene, float]:
+def trace_pixels(
+    image: FloatArray, background: FloatArray | None = None, removal: str | None = None
+) -> tuple[Scene, float]:
     """Return a scene that shows exactly the image, with one shape for a colour.
 
     Args:
         image: As ``find_cells`` takes it.
         background: Colour of an opaque image's canvas; None for the colour with the longest outline.
+        removal: As for ``trace.trace``.
 
     Returns:
         The scene, and the units of the view box for each pixel that its points lie on.
@@ -97,11 +101,16 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         ImageError: As ``find_cells``.
     """
     cells = find_cells(image)
+    is_opaque = image.shape[2] == 3
+    if removal and is_opaque:
+        cells, ground = without_ground(cells, removal)
+        background = (ground / 255).astype(np.float32)
     palette = (cells.palette / 255).astype(np.float32)
     shapes = [outlines(cells.colors == i) for i in range(len(palette))]
     height, width = image.shape[:2]
-    is_opaque = image.shape[2] == 3
-    if not is_opaque:
+    if removal and is_opaque:
+        seen = np.isin(np.arange(len(palette)), cells.colors)
+    elif not is_opaque:
         seen = cells.palette[:, 3] > 0
     else:
         if background is None:
@@ -124,3 +133,18 @@ def trace_pixels(image: FloatArray, background: FloatArray | None = None) -> tup
         rule=np.full(count, Rule.EVENODD, np.int32),
     )
     return scene, cells.per_pixel
+
+
+def without_ground(cells: Cells, removal: str) -> tuple[Cells, npt.NDArray[Any]]:
+    """Return cells of which those of the ground are of no colour, -1, and the ground's colour.
+
+    ``removal``: as for ``trace.trace``.
+    """
+    colors = cells.colors
+    ground = int(np.bincount(border(colors)).argmax())
+    inside = colors == ground
+    if removal == "outside":
+        framed = np.pad(inside, 1, constant_values=True)  # the frame joins what reaches the border
+        _, parts = linked_components(framed[:, 1:], framed[1:], framed)
+        inside = inside & (parts == parts[0, 0])[1:-1, 1:-1]
+    return replace(cells, colors=np.where(inside, -1, colors)), cells.palette[ground]

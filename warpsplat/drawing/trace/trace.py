@@ -14,7 +14,7 @@ from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
-from warpsplat.drawing.trace.grids import Bools, Ints, at_pixels, unchecked
+from warpsplat.drawing.trace.grids import Bools, Ints, at_pixels, border, unchecked
 from warpsplat.drawing.trace.hidden import Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
@@ -63,6 +63,7 @@ def trace(
     check: Callable[[], None] = unchecked,
     gradients: Gradients = GRADIENTS,
     noise: float | None = None,
+    removal: str | None = None,
 ) -> Traced:
     """Trace a drawing.
 
@@ -73,6 +74,8 @@ def trace(
         check: Called now and then; it may raise an exception to give up.
         gradients: Kinds of gradients that regions may have, where they are worth their bytes.
         noise: Of mixtures of colours [levels], in an image whose flat colours have none; None: measured.
+        removal: Of the ground of an opaque image, as in the settings: nothing is drawn there, and the canvas,
+            which has its colour, shows.
     """
     levels = np.asarray(image, np.float32) * 255
     is_opaque = levels.shape[2] == 3
@@ -84,7 +87,9 @@ def trace(
 
     def outlined(regions: Regions) -> Traced:
         partition = with_best_colors(find_partition(regions), regions)
-        return trace_partition(partition, may_have_ground=is_opaque, check=check)
+        return trace_partition(
+            partition, may_have_ground=is_opaque, check=check, removal=removal if is_opaque else None
+        )
 
     traced, target = outlined(regions), len(regions.paint)
     while most is not None and len(traced.scene) > most and target > 2:
@@ -96,7 +101,11 @@ def trace(
 
 
 def trace_partition(
-    partition: Partition, *, may_have_ground: bool = True, check: Callable[[], None] = unchecked
+    partition: Partition,
+    *,
+    may_have_ground: bool = True,
+    check: Callable[[], None] = unchecked,
+    removal: str | None = None,
 ) -> Traced:
     """Trace the outlines of partition.
 
@@ -104,6 +113,7 @@ def trace_partition(
         partition: Of an image.
         may_have_ground: Whether the canvas may have a colour, where all is opaque.
         check: As for ``trace``.
+        removal: As for ``trace``.
     """
     check()
     nesting, count = find_nesting(partition), len(partition.paint)
@@ -112,9 +122,12 @@ def trace_partition(
     boundary = find_boundary(loops, flat)
     tree = find_tree(loops, count)
     unpainted, ground = _ground(partition, tree, may_have_ground=may_have_ground)
+    if removal:
+        unpainted, ground = _removed(partition, removal)
     sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
     ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
-    layers = _layers(flat, loops, boundary, tree, ranks)
+    is_clear = np.array([coloring.color[3] < OPAQUE for coloring in flat.colorings])[flat.paint]
+    layers = _layers(flat, loops, boundary, tree, ranks, is_clear | unpainted if removal else is_clear)
     check()
     outlines = find_outlines(layers)
     for depth in range(1, int(nesting.depth.max()) + 1):
@@ -160,11 +173,12 @@ def _fitted(
     return [(region, contour) for region, contour in found if contour and len(contour.cubics) > 1]
 
 
-def _layers(partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints) -> Layers:
-    """Return regions as they lie on one another by their ranks."""
-    is_opaque = np.array([coloring.color[3] >= OPAQUE for coloring in partition.colorings])[partition.paint]
-    hiding = np.where(is_opaque, ranks, -1)
-    holed = has_inside(tree, ~is_opaque)
+def _layers(
+    partition: Partition, loops: Loops, boundary: Boundary, tree: Tree, ranks: Ints, is_clear: Bools
+) -> Layers:
+    """Return regions as they lie on one another by their ranks; nothing may lie under those ``is_clear``."""
+    hiding = np.where(is_clear, -1, ranks)
+    holed = has_inside(tree, is_clear)
     # Something transparent may lie between regions as well as inside one; what reaches the border of the
     # image is not between them.
     has_holes = bool(enclosed(loops, holed).any())
@@ -183,12 +197,27 @@ def _ground(partition: Partition, tree: Tree, *, may_have_ground: bool) -> tuple
     if not may_have_ground or not opaque or clear.any():
         return clear, None
     painted = partition.paint[partition.labels]
-    edge = np.concatenate([painted[0], painted[-1], painted[:, 0], painted[:, -1]])
+    edge = border(painted)
     areas = np.bincount(painted.reshape(-1), minlength=len(partition.colorings))
     paint = int((areas * np.isin(np.arange(len(areas)), edge)).argmax())
     if partition.colorings[paint].ramp is not None:
         return np.zeros(len(partition.paint), np.bool_), None
     return bare_ground(tree, partition.paint == paint), partition.colorings[paint]
+
+
+ALIKE = 6.0
+"""How far colours that pass for the ground's are off it [levels]: in a JPEG, parts of one colour differ."""
+
+
+def _removed(partition: Partition, removal: str) -> tuple[Bools, Coloring]:
+    """Return which regions are not painted as the ground is removed, and its colouring, the border's."""
+    edge = border(partition.labels)
+    ground = partition.colorings[int(np.bincount(partition.paint[edge]).argmax())]
+    off = np.array([np.abs(coloring.color - ground.color).max() for coloring in partition.colorings])
+    is_ground = (off <= ALIKE)[partition.paint]
+    if removal == "outside":
+        is_ground &= np.isin(np.arange(len(is_ground)), edge)
+    return is_ground, ground
 
 
 def _scene(canvas: Canvas, shapes: list[Fill]) -> Traced:

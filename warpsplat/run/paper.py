@@ -1,0 +1,75 @@
+"""The size of a file on paper, and its size in bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from warpsplat.fit.export import finished
+from warpsplat.fit.settings import Settings
+from warpsplat.run.prepare import PreparedImage
+from warpsplat.scene import Scene
+from warpsplat.scene.geometry import most_seen
+from warpsplat.svg.page import PIXELS_AN_INCH, Sheet, natural_sheet, on_sheet, sheet_for, with_own_size
+
+
+@dataclass(frozen=True)
+class Paper:
+    """What a file is drawn on."""
+
+    settings: Settings
+    size: tuple[int, int]
+    """Width and height of the image [px]."""
+    resolution: tuple[float, float]
+    """Pixels an inch along x and y, for the picture's own size."""
+    where_from: str
+    """Where that is from, for people."""
+
+    def __call__(self, svg: str) -> str:
+        """Return a file written here with the size that the settings ask for, if any."""
+        settings = self.settings
+        if settings.size or settings.page:
+            return on_sheet(svg, sheet_for(settings.size, settings.page, settings.units, *self.size))
+        return with_own_size(svg, self._sheet) if settings.sized_by else svg
+
+    def notes(self) -> tuple[str, ...]:
+        """Return which size the picture has by its resolution, if that decides it."""
+        settings = self.settings
+        if settings.sized_by not in {"dpi", "units"} or settings.units == "px":
+            return ()
+        size = "x".join(self._sheet.lengths()) + f" {self._sheet.unit}"
+        x, y = (f"{each:.6g}" for each in self.resolution)
+        return (f"{size}: {x if x == y else f'{x} and {y}'} pixels an inch, {self.where_from}",)
+
+    @property
+    def _sheet(self) -> Sheet:
+        return natural_sheet(*self.size, self.resolution, self.settings.units)
+
+
+def paper_for(image: PreparedImage, settings: Settings) -> Paper:
+    """Return what the file of an image is drawn on."""
+    resolution, where_from = (PIXELS_AN_INCH, PIXELS_AN_INCH), "as the image file states none; --dpi gives it"
+    if settings.dpi:
+        resolution, where_from = (settings.dpi, settings.dpi), "by --dpi"
+    elif image.resolution:
+        resolution, where_from = image.resolution, "by the image file"
+    return Paper(settings, image.size, resolution, where_from)
+
+
+def export_within(
+    scene: Scene, settings: Settings, per_pixel: float, metadata: str, paper: Paper
+) -> tuple[str, Scene]:
+    """Return the SVG, not yet on paper, and its shapes: all, or those that show most if ``max_bytes`` allows
+    no more.
+    """
+
+    def made() -> tuple[str, int]:
+        text = finished(scene, settings, per_pixel, metadata)
+        return text, len(paper(text).encode())
+
+    svg, size = made()
+    while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
+        excess = 1 - settings.max_bytes / size
+        count = min(max(1, round(excess * len(scene))), len(scene) - 1)
+        scene = most_seen(scene, len(scene) - count)
+        svg, size = made()
+    return svg, scene
