@@ -27,6 +27,7 @@ from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import ATTRIBUTES, FloatArray, IndexArray, Kind, Scene
+from warpsplat.svg.page import in_pixels, sheet_for
 from warpsplat.svg.sizes import PATH
 
 STROKE_STEPS = 240
@@ -43,19 +44,21 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     """Trace line art as strokes, and refine them against its ink.
 
     Each pen gets a layer, ``pen-1-rrggbb`` for the most used one: its filled areas, if the
-    settings are mixed, and strokes ordered to minimise pen-up travel.
+    settings are mixed, and strokes ordered to minimise pen-up travel. If the settings have a width, all
+    strokes get it.
 
     Raises:
         ImageError: there is no ink.
     """
     across, down = margins(problem.target, THIN_SIDE)
+    width = _given_width(problem)
     problem = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     ink = find_ink(problem.target, mixed=settings.mixed)
     color = solid_color(settings.background)
     if color is not None or settings.background == "none":
         ink = replace(ink, paper=color)
-    traced = trace_ink(ink, mixed=settings.mixed)
+    traced = trace_ink(ink, mixed=settings.mixed, ring_width=width)
     if not traced.lines and not traced.areas:
         raise ImageError("no lines found: nothing but specks is darker than the paper around it")
     begin = 0.5 if traced.areas else 0.0
@@ -66,12 +69,26 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     if len(lines):
         picture, importance = _to_refine(ink, traced)
         made = refined(lines, Problem(picture, settings, importance), run.part(begin, 1.0))
-        lines = toured(with_dots(ink, traced, made.scene, run))
+        lines = made.scene
+        if width is None:
+            lines = with_dots(ink, traced, lines, run)
+        else:
+            lines = replace(lines, widths=np.full_like(lines.widths, width))
+        lines = toured(lines)
     scene = fills.append(lines)
     scene = scene.take(np.argsort(scene.layer, kind="stable"))
     scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
     scene = replace(scene, layer_names=pen_names(scene))
     return replace(made, scene=cut(scene, across, down), per_pixel=max(per_pixel, made.per_pixel))
+
+
+def _given_width(problem: Problem) -> float | None:
+    """Return the width that all strokes are to have [px], if there is one."""
+    settings, (height, width) = problem.settings, problem.target.shape[:2]
+    if not settings.width:
+        return None
+    sheet = sheet_for(settings.size, settings.page, settings.units, width, height)
+    return in_pixels(settings.width, sheet, width, height)
 
 
 def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:

@@ -317,6 +317,14 @@ class Settings:
     size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
     page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
     units: str = option("", "Unit of the size in the file: mm, cm, in, pt, px.", metavar="UNIT")
+    width: str = option(
+        "",
+        "Of line art: one width for all strokes, in pixels or, such as 0.3mm, on the sheet.",
+        metavar="N",
+        parse=str,
+        subjects=("line",),
+        elsewhere="ignored",
+    )
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
@@ -537,10 +545,12 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
-    if settings.size or settings.page or settings.units:
-        from warpsplat.svg.page import sheet_for  # brings what writes files
+    if settings.size or settings.page or settings.units or settings.width:
+        from warpsplat.svg.page import in_pixels, sheet_for  # brings what writes files
 
-        sheet_for(settings.size, settings.page, settings.units, 1, 1)
+        sheet = sheet_for(settings.size, settings.page, settings.units, 1, 1)
+        if settings.width:
+            in_pixels(settings.width, sheet, 1, 1)
     return settings
 
 

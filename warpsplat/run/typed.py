@@ -51,5 +51,6 @@ class Options(RefineOptions, total=False):
     size: str | None
     page: str | None
     units: str | None
+    width: str | None
     symbols: bool | None
     strokes: bool | None

@@ -33,6 +33,9 @@ VIEW = re.compile(
 OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
 """The same, surely written here: margins of other files may belong to the picture."""
 
+LENGTH = re.compile(r"(\d+(?:\.\d+)?)\s*(mm|cm|in|pt)?", re.IGNORECASE)
+"""A length in pixels, or on the sheet."""
+
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
 
 DECIMALS = 3
@@ -51,6 +54,10 @@ class Sheet:
     """Kept free on each side [mm]."""
     unit: str = "mm"
     """Unit of the size in the file."""
+
+    def scale(self, width: float, height: float) -> float:
+        """Return how many units of a picture of that size are a millimetre."""
+        return max(width / (self.width - 2 * self.margin), height / (self.height - 2 * self.margin))
 
 
 def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet:
@@ -86,6 +93,19 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     return Sheet(sides[0], sides[1], unit=unit)
 
 
+def in_pixels(length: str, sheet: Sheet, width: int, height: int) -> float:
+    """Return a length in pixels of an image of that size: ``2``, or on its sheet, as ``0.3mm``.
+
+    Raises:
+        UsageError: It is not a length, or zero.
+    """
+    found = LENGTH.fullmatch(length.strip())
+    if not found or not float(found[1]):
+        raise UsageError(f"width must be pixels, such as 2, or a length such as 0.3mm, not {shown(length)}")
+    factor = MILLIMETRES[found[2].lower()] * sheet.scale(width, height) if found[2] else 1.0
+    return float(found[1]) * factor
+
+
 def placed(text: str, size: str, page: str, unit: str) -> str:
     """Return a file written here, as large as options ask for; arguments and errors as ``sheet_for``."""
     if not (size or page or unit):
@@ -104,7 +124,7 @@ def on_sheet(text: str, sheet: Sheet) -> str:
     """
     head = own_head(text)
     width, height = float(head[3]), float(head[4])
-    units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
+    units = sheet.scale(width, height)
     across, down = math.ceil(sheet.width * units), math.ceil(sheet.height * units)
     left, top = round((width - across) / 2), round((height - down) / 2)
     return _with_head(text, _attributes(sheet), (left, top, across, down))

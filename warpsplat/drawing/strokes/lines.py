@@ -83,15 +83,18 @@ class TracedLines:
         )
 
 
-def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> TracedLines:
+def trace_ink(
+    ink: Ink, *, mixed: bool = False, only_lines: bool = False, ring_width: float | None = None
+) -> TracedLines:
     """Find the centre lines of ink, and their pens; through junctions they go straight on.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas, which are not traced.
         only_lines: Whether it has no broad parts, however wide it is.
+        ring_width: As for ``split``.
     """
-    parts = Split(ink) if only_lines else split(ink, mixed=mixed)
+    parts = Split(ink) if only_lines else split(ink, mixed=mixed, ring_width=ring_width)
     fine = 2 if ink.mask.size <= FINE_PIXELS else 1
     graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
     graph = with_crossings(graph)
