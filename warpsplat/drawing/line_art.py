@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
+from warpsplat.drawing.junctions import with_junctions
 from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
@@ -162,7 +163,10 @@ def _opaque(paper: FloatArray | None) -> FloatArray:
 
 
 def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
-    """Return traced strokes fitted to a picture of their ink; those that are about as wide have one width."""
+    """Return traced strokes fitted to a picture of their ink.
+
+    Those that are about as wide have one width, and those that end at others meet their centre lines.
+    """
     paper = _opaque(strokes.canvas.background)
     canvas = replace(strokes.canvas, background=paper)
     start = replace(strokes, layer=np.zeros_like(strokes.layer), canvas=canvas)
@@ -171,7 +175,7 @@ def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
     (thinnest,) = (attribute.low[0] for attribute in ATTRIBUTES if attribute.name == "widths")  # of a fit
     widths = np.where(strokes.widths < thinnest, strokes.widths, made.scene.widths)
     found = replace(made.scene, widths=widths, canvas=strokes.canvas, layer=strokes.layer)
-    return replace(made, scene=with_equal_widths(found))
+    return replace(made, scene=with_junctions(with_equal_widths(found)))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:
