@@ -45,10 +45,10 @@ def find_chains(graph: Graph, pens: Ints) -> list[tuple[Floats, bool, int]]:
         pairs = [(0, 1)] if len(ends) == 2 and kinds[0] == kinds[1] else joined_arms(arms, kinds)[0]
         for i, j in pairs:
             following |= {ends[i]: ends[j], ends[j]: ends[i]}
-    passed = {node for node, ends in enumerate(graph.at) if not following.keys().isdisjoint(ends)}
+    tips = {node for node, ends in enumerate(graph.at) if len(ends) > 1 and following.keys().isdisjoint(ends)}
     chains = []
     for run, closed in runs_of(len(graph.edges), following):
-        points, is_ring = _traced(graph, run, passed, closed=closed)
+        points, is_ring = _traced(graph, run, tips, closed=closed)
         chains.append((points, is_ring, int(pens[run[0][0]])))
     return chains
 
@@ -102,10 +102,10 @@ def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
     return pairs, total + END * len(left)
 
 
-def _traced(graph: Graph, run: list[End], passed: set[int], *, closed: bool) -> tuple[Floats, bool]:
+def _traced(graph: Graph, run: list[End], tips: set[int], *, closed: bool) -> tuple[Floats, bool]:
     """Return points along edges that no junction bends, and whether they are a ring.
 
-    ``passed``: nodes through which lines go; one that ends there comes to it straight.
+    ``tips``: nodes where several lines end and none goes on, to which they lead; other ends are straight.
     """
     edges, parts = [graph.edge_from(end) for end in run], []
     for edge in edges:
@@ -117,7 +117,7 @@ def _traced(graph: Graph, run: list[End], passed: set[int], *, closed: bool) -> 
     if not closed:
         ends = (run[0], edges[0].nodes[0]), ((run[-1][0], 1 - run[-1][1]), edges[-1].nodes[1])
         begin, stop = (
-            _ahead(_arm(graph, end, node), graph.places[node]) if node in passed else graph.places[node]
+            graph.places[node] if node in tips else _ahead(_arm(graph, end, node), graph.places[node])
             for end, node in ends
         )
         points = np.concatenate([begin[None], points, stop[None]])
