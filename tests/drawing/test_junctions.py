@@ -48,6 +48,12 @@ def test_a_curve_goes_on_as_it_is_bent() -> None:
     assert np.hypot(*(end - (48, 41))) == pytest.approx(20, abs=0.1)
 
 
+def test_a_short_handle_does_not_throw_a_curve_off() -> None:
+    curve = [(48, 18.5), (48, 18.52), (60, 50), (70, 60)]
+    made = with_junctions(strokes(BAR, curve)).points_of(1)
+    assert made == pytest.approx(np.array([(48, 20), *curve[1:]]), abs=2)
+
+
 @pytest.mark.parametrize(
     "other",
     [

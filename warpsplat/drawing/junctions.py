@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpsplat.drawing.trace.beziers import from_parameter, points_at
 from warpsplat.drawing.trace.grids import Floats
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import Scene
@@ -45,7 +46,7 @@ def _shift(points: Floats, rows: Floats, widths: Floats, end: int, toward: int) 
     reach = 0.5 * widths[:, None]
     low, high = points[rows].min(axis=1) - reach, points[rows].max(axis=1) + reach
     near = ((low <= here) & (here <= high)).all(axis=1)
-    lines = _flattened(points[rows[near]]) - here
+    lines = points_at(points[rows[near]], SHARES) - here
     in_ink = _distances(lines) <= widths[near] / 2
     lines, most = lines[in_ink], widths[near][in_ink][:, None]
     beside = lines[..., 1] * way[0] - lines[..., 0] * way[1]
@@ -60,18 +61,12 @@ def _shift(points: Floats, rows: Floats, widths: Floats, end: int, toward: int) 
 
 def _extended(cubic: Floats, shift: Floats) -> Floats:
     """Return a cubic (4, 2) that goes on as it does, but begins elsewhere, at a point along its beginning."""
-    way = 3 * (cubic[1] - cubic[0])
+    ways = np.stack([3 * (cubic[1] - cubic[0]), cubic[3] - cubic[0]])  # of which one is 0 at sharp beginnings
+    way = ways[hypot(*ways.T).argmax()]
     t = float((shift * way).sum() / max(float((way * way).sum()), 1e-12))
-    first = cubic[:-1] + t * np.diff(cubic, axis=0)
-    second = first[:-1] + t * np.diff(first, axis=0)
-    return np.stack([cubic[0] + shift, second[1], first[2], cubic[3]])
-
-
-def _flattened(cubics: Floats) -> Floats:
-    """Return points along cubics (cubic, 4, 2), shape (cubic, point, 2)."""
-    t, u = SHARES, 1 - SHARES
-    weights = np.stack([u * u * u, 3 * t * u * u, 3 * t * t * u, t * t * t], axis=1)
-    return np.asarray((weights[None, :, :, None] * cubics[:, None]).sum(axis=2))
+    made = from_parameter(cubic, min(max(t, -1.0), 1.0))
+    made[0] = cubic[0] + shift
+    return made
 
 
 def _distances(lines: Floats) -> Floats:

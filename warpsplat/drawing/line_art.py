@@ -10,7 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.junctions import with_junctions
-from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
+from warpsplat.drawing.prices import CUBIC, LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
@@ -20,16 +20,17 @@ from warpsplat.drawing.thin import THIN_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated, nearest_in
 from warpsplat.drawing.trace.trace import trace
+from warpsplat.drawing.width_steps import by_stroke, cut_at_steps, rejoined
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.portable.elementary import hypot
+from warpsplat.portable.elementary import exp, hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import ATTRIBUTES, FloatArray, IndexArray, Kind, Scene
 from warpsplat.svg.page import in_pixels, sheet_for
-from warpsplat.svg.sizes import PATH
+from warpsplat.svg.sizes import HEAD, PATH
 
 STROKE_STEPS = 240
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
@@ -39,6 +40,10 @@ STROKE_RATE = 0.12
 
 ALIKE = 0.3
 """Difference of the widths of usual strokes up to which one pen drew them [px]."""
+
+
+LIFT = 2.0
+"""Price of a further stroke over that of its bytes: for it the pen is lifted."""
 
 
 def draw_lines(problem: Problem, run: Run) -> Fit:
@@ -69,9 +74,11 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
         fills, per_pixel = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
     if len(lines):
         picture, importance = _to_refine(ink, traced)
-        made = refined(lines, Problem(picture, settings, importance), run.part(begin, 1.0))
+        ink_alone = Problem(picture, settings, importance)
+        made = refined(lines, ink_alone, run.part(begin, (begin + 1) / 2))
         lines = made.scene
         if width is None:
+            lines = with_steps(ink, traced, lines, ink_alone, run.part((begin + 1) / 2, 1.0))
             lines = with_dots(ink, traced, lines, run)
         else:
             lines = replace(lines, widths=np.full_like(lines.widths, width))
@@ -92,14 +99,39 @@ def _given_width(problem: Problem) -> float | None:
     return in_pixels(settings.width, sheet, width, height)
 
 
-def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
-    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+def _drawn(ink: Ink, traced: TracedLines, lines: Scene, data: float, run: Run) -> tuple[FloatArray, float]:
+    """Return the share of each pixel that is drawn, and the error that a further stroke is worth.
+
+    ``data``: bytes of its path data after the first point. The error is squared, summed over pixels.
+    """
     white = replace(lines.canvas, background=np.ones(3, np.float32))
     black = replace(lines, canvas=white, colors=np.zeros_like(lines.colors))
     apart = 0 if traced.areas is None else traced.areas.cover
     drawn = np.maximum(1 - render(black, backend=run.backend)[..., 0], apart)
-    size = PATH * len(lines) + NUMBER * lines.points.size
-    least = worth(float(np.square(ink.cover - drawn).sum()), size) * (PATH + MOVE + LEVEL)
+    size = HEAD + PATH * len(lines) + NUMBER * lines.points.size
+    error = max(float(np.square(ink.cover - drawn).sum()), 1e-9)
+    # A byte is worth less, the less error is left, and nothing is worth more than all of it.
+    return drawn, error * (1 - float(exp(-LIFT * worth(error, size) * (PATH + MOVE + data) / error)))
+
+
+def with_steps(ink: Ink, traced: TracedLines, lines: Scene, problem: Problem, run: Run) -> Scene:
+    """Return fitted strokes, cut where the width changes if that is worth a further stroke."""
+    drawn, price = _drawn(ink, traced, lines, CUBIC, run)
+    pieces, owner = cut_at_steps(lines, ink.cover - drawn, price)
+    if len(pieces) == len(lines) or run.over():
+        return lines
+    pieces = rejoined(refined(pieces, problem, replace(run, checkpoint=None)).scene, owner)
+    then, _ = _drawn(ink, traced, pieces, CUBIC, run)
+    gain = by_stroke(lines, np.square(ink.cover - drawn) - np.square(ink.cover - then))
+    cuts = np.bincount(owner) - 1
+    is_better = (cuts > 0) & (gain > price * cuts)
+    kept = lines.take(np.flatnonzero(~is_better))
+    return with_junctions(kept.append(pieces.take(np.flatnonzero(is_better[owner]))))
+
+
+def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
+    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+    drawn, least = _drawn(ink, traced, lines, LEVEL, run)
     inside = np.minimum(depth(ink.mask) - 0.5, BROAD * pen_width(ink.mask))
     parts: IndexArray = np.asarray(cv2.connectedComponents((ink.cover - drawn > 0.5).astype(np.uint8))[1])
     dots = []

@@ -192,7 +192,7 @@ def _inner(graph: Graph) -> list[tuple[int, ...]]:
 def _are_overlaps(graph: Graph, numbers: tuple[int, ...], nodes: set[int]) -> bool:
     """Return whether the lines that meet at edges bend less, and end less often, without these.
 
-    Together they must cover them.
+    Together they must cover them, and other edges that ``contracted`` leaves out with them.
     """
     apart, together = 0.0, []
     for node in sorted(nodes):
@@ -200,7 +200,18 @@ def _are_overlaps(graph: Graph, numbers: tuple[int, ...], nodes: set[int]) -> bo
         apart += joined_arms(arms, [0] * len(arms))[1]
         together += [arm for arm, end in zip(arms, graph.at[node], strict=True) if end[0] not in numbers]
     pairs, cost = joined_arms(together, [0] * len(together))
-    return cost + END <= apart and all(_are_covering(together, pairs, graph.edges[n]) for n in numbers)
+    if cost + END > apart:
+        return False
+    place = graph.places[sorted(nodes)].mean(axis=0)
+    radius = max(float(graph.radii[node] + hypot(*(graph.places[node] - place))) for node in nodes)
+    inner = {
+        number
+        for node in nodes
+        for number, _ in graph.at[node]
+        if nodes.issuperset(graph.edges[number].nodes)
+    }
+    gone = [n for n in sorted(inner) if (hypot(*(graph.edges[n].points - place).T) <= radius).all()]
+    return all(_are_covering(together, pairs, graph.edges[n]) for n in {*gone, *numbers})
 
 
 def with_corners(graph: Graph) -> Graph:
