@@ -18,17 +18,19 @@ SHARES = np.linspace(0, 1, 33)  # of a cubic, between which it is taken for stra
 def with_junctions(strokes: Scene) -> Scene:
     """Return strokes, of one contour each, of which those that end in the ink of others end on centre lines.
 
-    Each is lengthened or shortened along its end, by no more than the width of the other.
+    Each is lengthened or shortened along its end, by no more than twice the width of the other.
     """
     points, rows = strokes.points.astype(np.float64), cubic_rows(strokes)
     first = strokes.first.astype(np.intp)
     widths = strokes.widths.astype(np.float64)[np.searchsorted(first, rows[:, 0], "right") - 1]
+    reach = 0.5 * widths[:, None]
+    low, high = points[rows].min(axis=1) - reach, points[rows].max(axis=1) + reach
     for stroke in np.flatnonzero(strokes.closed == 0).tolist():
         last = int(first[stroke + 1]) - 1
         for end, toward in ((int(first[stroke]), 1), (last, -1)):
-            # A cubic cannot end on itself.
-            others = (rows[:, 0] != end) & (rows[:, 3] != end)
-            shift = _shift(points, rows[others], widths[others], end, toward)
+            near = np.flatnonzero(((low <= points[end]) & (points[end] <= high)).all(axis=1))
+            near = near[(rows[near, 0] != end) & (rows[near, 3] != end)]  # a cubic cannot end on itself
+            shift = _shift(points, rows[near], widths[near], end, toward)
             if shift.any():
                 own = slice(end, end + 4) if toward > 0 else slice(end - 3, end + 1)
                 points[own][::toward] = _extended(points[own][::toward], shift)
@@ -40,22 +42,19 @@ def _shift(points: Floats, rows: Floats, widths: Floats, end: int, toward: int) 
     here, none = points[end], np.zeros(2)
     inner = points[[end + toward, end + 2 * toward, end + 3 * toward]]
     away = hypot(*(here - inner).T)
-    if away.max() < 1e-6:
+    if not len(rows) or away.max() < 1e-6:
         return none
     way = (here - inner[away > 1e-6][0]) / away[away > 1e-6][0]
-    reach = 0.5 * widths[:, None]
-    low, high = points[rows].min(axis=1) - reach, points[rows].max(axis=1) + reach
-    near = ((low <= here) & (here <= high)).all(axis=1)
-    lines = points_at(points[rows[near]], SHARES) - here
-    in_ink = _distances(lines) <= widths[near] / 2
-    lines, most = lines[in_ink], widths[near][in_ink][:, None]
+    lines = points_at(points[rows], SHARES) - here
+    in_ink = _distances(lines) <= widths / 2
+    lines, most = lines[in_ink], 2 * widths[in_ink][:, None]
     beside = lines[..., 1] * way[0] - lines[..., 0] * way[1]
     ahead = (lines * way).sum(axis=2)
     before, after = beside[:, :-1], beside[:, 1:]
     crosses = (before * after <= 0) & (before != after)
     share = before / np.where(crosses, before - after, 1)
     met = ahead[:, :-1] + share * np.diff(ahead, axis=1)
-    found: Floats = met[crosses & (np.abs(met) <= 2 * most)]
+    found: Floats = met[crosses & (np.abs(met) <= most)]
     return found[np.abs(found).argmin()] * way if len(found) else none
 
 
