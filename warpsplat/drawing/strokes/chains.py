@@ -156,9 +156,11 @@ def with_crossings(graph: Graph) -> Graph:
     while True:
         used: set[int] = set()
         overlaps: list[int] = []
+        arms = [[_arm(graph, end, node) for end in ends] for node, ends in enumerate(graph.at)]
+        costs = [joined_arms(own, [0] * len(own))[1] if len(own) > 2 else 0.0 for own in arms]
         for numbers in _inner(graph):
             nodes = {node for number in numbers for node in graph.edges[number].nodes}
-            if used.isdisjoint(nodes) and _are_overlaps(graph, numbers, nodes):
+            if used.isdisjoint(nodes) and _are_overlaps(graph, numbers, nodes, arms, costs):
                 overlaps += numbers
                 used |= nodes
         if not overlaps:
@@ -189,18 +191,28 @@ def _inner(graph: Graph) -> list[tuple[int, ...]]:
     return sorted(chosen, key=lambda each: (len(each), sum(lengths[number] for number in each), each))
 
 
-def _are_overlaps(graph: Graph, numbers: tuple[int, ...], nodes: set[int]) -> bool:
+def _are_overlaps(
+    graph: Graph, numbers: tuple[int, ...], nodes: set[int], arms: list[list[Arm]], costs: list[float]
+) -> bool:
     """Return whether the lines that meet at edges bend less, and end less often, without these.
 
     Together they must cover them, and other edges that ``contracted`` leaves out with them.
+
+    Args:
+        graph: A skeleton.
+        numbers: Of the edges.
+        nodes: Where they begin and end.
+        arms: Of each node, in the order of its ends.
+        costs: Of joining the arms of each node.
     """
-    apart, together = 0.0, []
-    for node in sorted(nodes):
-        arms = [_arm(graph, end, node) for end in graph.at[node]]
-        apart += joined_arms(arms, [0] * len(arms))[1]
-        together += [arm for arm, end in zip(arms, graph.at[node], strict=True) if end[0] not in numbers]
+    together = [
+        arm
+        for node in sorted(nodes)
+        for arm, end in zip(arms[node], graph.at[node], strict=True)
+        if end[0] not in numbers
+    ]
     pairs, cost = joined_arms(together, [0] * len(together))
-    if cost + END > apart:
+    if cost + END > sum(costs[node] for node in sorted(nodes)):
         return False
     place = graph.places[sorted(nodes)].mean(axis=0)
     radius = max(float(graph.radii[node] + hypot(*(graph.places[node] - place))) for node in nodes)
