@@ -21,7 +21,16 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import DxfCurves, LossName, OpticsChoice, Painting, Quality, Removal, Stack, Subject
+from warpsplat.fit.settings import (
+    DxfCurves,
+    LossName,
+    OpticsChoice,
+    Painting,
+    Quality,
+    Removal,
+    Stack,
+    Subject,
+)
 
 
 class RefineOptions(TypedDict, total=False):

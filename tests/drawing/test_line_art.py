@@ -12,7 +12,7 @@ import pytest
 import warpsplat
 from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
 from tests.runs import scored, vectorize
-from warpsplat.errors import ImageError
+from warpsplat.errors import ImageError, UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
@@ -86,6 +86,26 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
         assert text == results[1].svg
         assert 'width="297mm" height="210mm"' in text
         assert scored(results[0]).psnr == scored(results[1]).psnr
+
+
+@pytest.mark.parametrize(
+    ("given", "pixels"),
+    [({"width": "2"}, 2), ({"width": 1.5}, 1.5), ({"width": "0.5 mm", "size": "48x36mm"}, 1)],
+)
+def test_a_given_width_is_that_of_all_strokes(given: dict[str, str], pixels: float, device: str) -> None:
+    disc = '<circle cx="24" cy="36" r="14" fill="#000" stroke="none"/>'
+    image = drawn(f'{disc}<path d="M50 12V60M70 10V52"/><path d="M88 30V60" stroke-width="5"/>')
+    scene = vectorize(image, make_settings(subject="line", **given), Backend.on(device)).scene
+    assert scene.widths == pytest.approx(pixels)
+    ends = scene.points[np.stack([scene.first[:-1], scene.first[1:] - 1])][:, scene.closed == 0]
+    assert sorted(np.ptp(ends, axis=0)[:, 1].round().tolist())[-3:] == [30, 42, 48]
+    assert scene.closed.sum() >= 14 / pixels - 2, "the disc is filled by rings"
+
+
+@pytest.mark.parametrize("width", ["0", "thin", "2px", "-1"])
+def test_widths_that_are_none_are_refused(width: str) -> None:
+    with pytest.raises(UsageError, match="a length such as"):
+        make_settings(subject="line", width=width)
 
 
 def test_paper_without_ink_is_refused(device: str) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from warpsplat.errors import ImageError
 from warpsplat.svg.dxf import CURVES, TOLERANCE, draw_dxf
-from warpsplat.svg.page import placed
+from warpsplat.svg.page import on_sheet, sheet_for
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg
 
@@ -160,7 +160,9 @@ def test_a_background_on_a_sheet_is_left_out() -> None:
         10,
         "drawing",
     )
-    text = placed(write_svg(scene, per_pixel=10.0), "", "a4", "")
+    text = on_sheet(
+        write_svg(scene, per_pixel=10.0), sheet_for("", "a4", "", scene.canvas.width, scene.canvas.height)
+    )
     (entity,) = read(text).modelspace()
     assert np.ptp(points_of(entity), axis=0) == pytest.approx(
         [152, 152], rel=5e-3

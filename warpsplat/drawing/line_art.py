@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.prices import LEVEL, MOVE, NUMBER, worth
+from warpsplat.drawing.junctions import with_junctions
+from warpsplat.drawing.prices import CUBIC, LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
 from warpsplat.drawing.strokes.lines import FINE_PIXELS, TracedLines, trace_ink
@@ -19,15 +20,16 @@ from warpsplat.drawing.thin import THIN_SIDE, continued, cut, margins
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_boxes, depth, dilated, nearest_in
 from warpsplat.drawing.trace.trace import trace
+from warpsplat.drawing.width_steps import by_stroke, cut_at_steps, rejoined
 from warpsplat.errors import ImageError
 from warpsplat.fit.loop import Start, fit
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
-from warpsplat.portable.elementary import hypot
+from warpsplat.portable.elementary import exp, hypot
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import ATTRIBUTES, FloatArray, IndexArray, Kind, Scene
-from warpsplat.svg.sizes import PATH
+from warpsplat.svg.sizes import HEAD, PATH
 
 STROKE_STEPS = 240
 """Most steps of the refinement: the strokes are traced to fractions of a pixel."""
@@ -39,23 +41,29 @@ ALIKE = 0.3
 """Difference of the widths of usual strokes up to which one pen drew them [px]."""
 
 
+LIFT = 2.0
+"""Price of a further stroke over that of its bytes: for it the pen is lifted."""
+
+
 def draw_lines(problem: Problem, run: Run) -> Fit:
     """Trace line art as strokes, and refine them against its ink.
 
     Each pen gets a layer, ``pen-1-rrggbb`` for the most used one: its filled areas, if the
-    settings are mixed, and strokes ordered to minimise pen-up travel.
+    settings are mixed, and strokes ordered to minimise pen-up travel. If the settings have a width, all
+    strokes get it.
 
     Raises:
         ImageError: there is no ink.
     """
     across, down = margins(problem.target, THIN_SIDE)
+    width = float(problem.settings.width) if problem.settings.width else None
     problem = replace(problem, target=continued(problem.target, across, down))
     settings = problem.settings
     ink = find_ink(problem.target, mixed=settings.mixed)
     color = solid_color(settings.background)
     if color is not None:
         ink = replace(ink, paper=color)
-    traced = trace_ink(ink, mixed=settings.mixed)
+    traced = trace_ink(ink, mixed=settings.mixed, ring_width=width)
     if not traced.lines and not traced.areas:
         raise ImageError("no lines found: nothing but specks is darker than the paper around it")
     begin = 0.5 if traced.areas else 0.0
@@ -65,8 +73,15 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
         fills, per_pixel = filled(traced, run.part(0.0, begin), finest(settings), tidy=settings.tidy)
     if len(lines):
         picture, importance = _to_refine(ink, traced)
-        made = refined(lines, Problem(picture, settings, importance), run.part(begin, 1.0))
-        lines = toured(with_dots(ink, traced, made.scene, run))
+        ink_alone = Problem(picture, settings, importance)
+        made = refined(lines, ink_alone, run.part(begin, (begin + 1) / 2))
+        lines = made.scene
+        if width is None:
+            lines = with_steps(ink, traced, lines, ink_alone, run.part((begin + 1) / 2, 1.0))
+            lines = with_dots(ink, traced, lines, run)
+        else:
+            lines = replace(lines, widths=np.full_like(lines.widths, width))
+        lines = toured(lines)
     scene = fills.append(lines)
     scene = scene.take(np.argsort(scene.layer, kind="stable"))
     scene = replace(scene, layer=np.unique(scene.layer, return_inverse=True)[1].astype(np.int32))
@@ -74,14 +89,39 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     return replace(made, scene=cut(scene, across, down), per_pixel=max(per_pixel, made.per_pixel))
 
 
-def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
-    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+def _drawn(ink: Ink, traced: TracedLines, lines: Scene, data: float, run: Run) -> tuple[FloatArray, float]:
+    """Return the share of each pixel that is drawn, and the error that a further stroke is worth.
+
+    ``data``: bytes of its path data after the first point. The error is squared, summed over pixels.
+    """
     white = replace(lines.canvas, background=np.ones(3, np.float32))
     black = replace(lines, canvas=white, colors=np.zeros_like(lines.colors))
     apart = 0 if traced.areas is None else traced.areas.cover
     drawn = np.maximum(1 - render(black, backend=run.backend)[..., 0], apart)
-    size = PATH * len(lines) + NUMBER * lines.points.size
-    least = worth(float(np.square(ink.cover - drawn).sum()), size) * (PATH + MOVE + LEVEL)
+    size = HEAD + PATH * len(lines) + NUMBER * lines.points.size
+    error = max(float(np.square(ink.cover - drawn).sum()), 1e-9)
+    # A byte is worth less, the less error is left, and nothing is worth more than all of it.
+    return drawn, error * (1 - float(exp(-LIFT * worth(error, size) * (PATH + MOVE + data) / error)))
+
+
+def with_steps(ink: Ink, traced: TracedLines, lines: Scene, problem: Problem, run: Run) -> Scene:
+    """Return fitted strokes, cut where the width changes if that is worth a further stroke."""
+    drawn, price = _drawn(ink, traced, lines, CUBIC, run)
+    pieces, owner = cut_at_steps(lines, ink.cover - drawn, price)
+    if len(pieces) == len(lines) or run.over():
+        return lines
+    pieces = rejoined(refined(pieces, problem, replace(run, checkpoint=None)).scene, owner)
+    then, _ = _drawn(ink, traced, pieces, CUBIC, run)
+    gain = by_stroke(lines, np.square(ink.cover - drawn) - np.square(ink.cover - then))
+    cuts = np.bincount(owner) - 1
+    is_better = (cuts > 0) & (gain > price * cuts)
+    kept = lines.take(np.flatnonzero(~is_better))
+    return with_junctions(kept.append(pieces.take(np.flatnonzero(is_better[owner]))))
+
+
+def with_dots(ink: Ink, traced: TracedLines, lines: Scene, run: Run) -> Scene:
+    """Return strokes, and dots on what of the ink they leave bare, where these are worth their bytes."""
+    drawn, least = _drawn(ink, traced, lines, LEVEL, run)
     inside = np.minimum(depth(ink.mask) - 0.5, BROAD * pen_width(ink.mask))
     parts: IndexArray = np.asarray(cv2.connectedComponents((ink.cover - drawn > 0.5).astype(np.uint8))[1])
     dots = []
@@ -145,7 +185,10 @@ def _opaque(paper: FloatArray | None) -> FloatArray:
 
 
 def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
-    """Return traced strokes fitted to a picture of their ink; those that are about as wide have one width."""
+    """Return traced strokes fitted to a picture of their ink.
+
+    Those that are about as wide have one width, and those that end at others meet their centre lines.
+    """
     paper = _opaque(strokes.canvas.background)
     canvas = replace(strokes.canvas, background=paper)
     start = replace(strokes, layer=np.zeros_like(strokes.layer), canvas=canvas)
@@ -154,7 +197,7 @@ def refined(strokes: Scene, problem: Problem, run: Run) -> Fit:
     (thinnest,) = (attribute.low[0] for attribute in ATTRIBUTES if attribute.name == "widths")  # of a fit
     widths = np.where(strokes.widths < thinnest, strokes.widths, made.scene.widths)
     found = replace(made.scene, widths=widths, canvas=strokes.canvas, layer=strokes.layer)
-    return replace(made, scene=with_equal_widths(found))
+    return replace(made, scene=with_junctions(with_equal_widths(found)))
 
 
 def with_equal_widths(strokes: Scene) -> Scene:

@@ -344,6 +344,14 @@ class Settings:
         "Curves in a .dxf: arcs; splines; lines, for OpenSCAD; r12: lines, for old programs.",
         refine=True,
     )
+    width: str = option(
+        "",
+        "Of line art: one width for all strokes, in pixels or, such as 0.3mm, on the sheet.",
+        metavar="N",
+        parse=str,
+        subjects=("line",),
+        elsewhere="ignored",
+    )
     ids: bool = option(
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
@@ -587,12 +595,14 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
-    if settings.sized_by:
-        from warpsplat.svg.page import checked_unit, sheet_for  # brings what writes files
+    if settings.sized_by or settings.width:
+        from warpsplat.svg.page import checked_unit, length_of, sheet_for  # brings what writes files
 
         checked_unit(settings.units)
         if settings.size or settings.page:
             sheet_for(settings.size, settings.page, settings.units, 1, 1)
+        if settings.width:
+            length_of(settings.width)
     return settings
 
 

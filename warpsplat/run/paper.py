@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from warpsplat.fit.export import finished
 from warpsplat.fit.settings import Settings
 from warpsplat.run.prepare import PreparedImage
 from warpsplat.scene import Scene
 from warpsplat.scene.geometry import most_seen
-from warpsplat.svg.page import PIXELS_AN_INCH, Sheet, natural_sheet, on_sheet, sheet_for, with_own_size
+from warpsplat.svg.page import (
+    MILLIMETRES,
+    PIXELS_AN_INCH,
+    Sheet,
+    length_of,
+    natural_sheet,
+    on_sheet,
+    sheet_for,
+    with_own_size,
+)
 
 
 @dataclass(frozen=True)
@@ -28,21 +37,25 @@ class Paper:
         """Return a file written here with the size that the settings ask for, if any."""
         settings = self.settings
         if settings.size or settings.page:
-            return on_sheet(svg, sheet_for(settings.size, settings.page, settings.units, *self.size))
-        return with_own_size(svg, self._sheet) if settings.sized_by else svg
+            return on_sheet(svg, self.sheet)
+        return with_own_size(svg, self.sheet) if settings.sized_by else svg
 
     def notes(self) -> tuple[str, ...]:
         """Return which size the picture has by its resolution, if that decides it."""
         settings = self.settings
         if settings.sized_by not in {"dpi", "units"} or settings.units == "px":
             return ()
-        size = "x".join(self._sheet.lengths()) + f" {self._sheet.unit}"
+        size = "x".join(self.sheet.lengths()) + f" {self.sheet.unit}"
         x, y = (f"{each:.6g}" for each in self.resolution)
         return (f"{size}: {x if x == y else f'{x} and {y}'} pixels an inch, {self.where_from}",)
 
     @property
-    def _sheet(self) -> Sheet:
-        return natural_sheet(*self.size, self.resolution, self.settings.units)
+    def sheet(self) -> Sheet:
+        """What the file is drawn on: the sheet of the settings, or one of the picture's own size."""
+        settings = self.settings
+        if settings.size or settings.page:
+            return sheet_for(settings.size, settings.page, settings.units, *self.size)
+        return natural_sheet(*self.size, self.resolution, settings.units)
 
 
 def paper_for(image: PreparedImage, settings: Settings) -> Paper:
@@ -53,6 +66,17 @@ def paper_for(image: PreparedImage, settings: Settings) -> Paper:
     elif image.resolution:
         resolution, where_from = image.resolution, "by the image file"
     return Paper(settings, image.size, resolution, where_from)
+
+
+def with_width_in_pixels(image: PreparedImage) -> PreparedImage:
+    """Return an image whose settings' width of strokes, if any, is in pixels as it is processed."""
+    settings = image.problem.settings
+    if not settings.width:
+        return image
+    width, unit = length_of(settings.width)
+    width *= MILLIMETRES[unit] * paper_for(image, settings).sheet.scale(*image.size) if unit else 1
+    pixels = width * image.problem.size[0] / image.size[0]
+    return replace(image, problem=replace(image.problem, settings=replace(settings, width=f"{pixels:.9g}")))
 
 
 def export_within(

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
-from warpsplat.fit.settings import DxfCurves, LossName, OpticsChoice, Painting, Quality, Removal, Stack, Subject
+from warpsplat.fit.settings import (
+    DxfCurves,
+    LossName,
+    OpticsChoice,
+    Painting,
+    Quality,
+    Removal,
+    Stack,
+    Subject,
+)
 
 
 class RefineOptions(TypedDict, total=False):
@@ -57,5 +66,6 @@ class Options(RefineOptions, total=False):
     page: str | None
     units: str | None
     dpi: float | None
+    width: str | None
     symbols: bool | None
     strokes: bool | None

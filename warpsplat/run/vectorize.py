@@ -24,7 +24,7 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
-from warpsplat.run.paper import export_within, paper_for
+from warpsplat.run.paper import export_within, paper_for, with_width_in_pixels
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
@@ -130,6 +130,7 @@ def make_result(
     """
     begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
     checkpoint = run.checkpoint
+    image = with_width_in_pixels(image)
     problem, reduction = image.problem, image.reduction
     target, settings = problem.target, problem.settings
     run = timed(recorded(run, history), settings, target)

@@ -42,6 +42,9 @@ VIEW = re.compile(
 OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
 """The same, surely written here: margins of other files may belong to the picture."""
 
+LENGTH = re.compile(r"(\d+(?:\.\d+)?)\s*(mm|cm|in|pt)?", re.IGNORECASE)
+"""A length in pixels, or on the sheet."""
+
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
 
 DECIMALS = 3
@@ -69,6 +72,10 @@ class Sheet:
         sides = (side / MILLIMETRES[self.unit] for side in (self.width, self.height))
         width, height = (number(float(f"{side:.{DIGITS}g}"), MOST_DECIMALS) for side in sides)
         return width, height
+
+    def scale(self, width: float, height: float) -> float:
+        """Return how many units of a picture of that size make a millimetre."""
+        return max(width / (self.width - 2 * self.margin), height / (self.height - 2 * self.margin))
 
 
 def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet:
@@ -98,6 +105,18 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     if not all(0 < side <= LARGEST for side in sides):
         raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
     return Sheet(sides[0], sides[1], unit=unit)
+
+
+def length_of(text: str) -> tuple[float, str]:
+    """Return a length such as ``0.3mm`` as a number and its unit, empty if there is none.
+
+    Raises:
+        UsageError: It is not a length, or zero.
+    """
+    found = LENGTH.fullmatch(text.strip())
+    if not found or not float(found[1]):
+        raise UsageError(f"width must be pixels, such as 2, or a length such as 0.3mm, not {shown(text)}")
+    return float(found[1]), (found[2] or "").lower()
 
 
 def checked_unit(unit: str) -> str:
@@ -133,7 +152,7 @@ def on_sheet(text: str, sheet: Sheet) -> str:
     """
     head = own_head(text)
     width, height = float(head[3]), float(head[4])
-    units = max(width / (sheet.width - 2 * sheet.margin), height / (sheet.height - 2 * sheet.margin))
+    units = sheet.scale(width, height)
     across, down = math.ceil(sheet.width * units), math.ceil(sheet.height * units)
     left, top = round((width - across) / 2), round((height - down) / 2)
     return _with_head(text, _attributes(sheet), (left, top, across, down))

@@ -117,6 +117,10 @@ def test_no_ink_no_strokes() -> None:
 
 
 LOOP = '<path d="M8 60C40 70 80 40 60 16C48 2 30 16 44 36C56 54 80 60 90 40"/>'
+SPIRAL = (
+    '<path d="M48 36C48 28 60 28 60 38C60 50 36 50 36 36C36 18 72 18 72 38C72 64 24 64 24 36"/>'
+    '<path d="M6 20L92 48"/>'
+)
 SHARP = '<path d="M34 8L28 64M64 8L58 64M12 24H84M10 46H82"/>'
 NET = "".join(f'<path d="M{10 + 9 * i} 64L{26 + 9 * i} 8M8 {14 + 10 * i}H88"/>' for i in range(5))
 
@@ -129,6 +133,14 @@ NET = "".join(f'<path d="M{10 + 9 * i} 64L{26 + 9 * i} 8M8 {14 + 10 * i}H88"/>' 
         (SHARP, 4),
         ('<circle cx="48" cy="36" r="22"/><path d="M10 50L86 20"/>', 2),
         ('<path d="M70 12H26V60H70M26 35H60" stroke-width="5" stroke-linejoin="round"/>', 2),
+        ('<path d="M10 20H86M48 20V62"/>', 2),
+        ('<path d="M20 12L76 60M22 58L78 16M48 8V66"/>', 3),
+        ('<path d="M20 10L34 62L48 10L62 62L76 10"/>', 1),
+        ('<path d="M28 62L48 10L68 62M35 44H61"/>', 2),
+        ('<path d="M36 10L48 40L60 10M48 40V64"/>', 2),
+        ('<path d="M10 50H86M30 50V34M50 50V36M70 50V28"/>', 4),
+        ("".join(f'<path d="M{8 + 7 * i} 62L{28 + 7 * i} 10"/>' for i in range(9)), 9),
+        (SPIRAL, 2),
         (LOOP, 1),
         (NET.replace("<path", '<path stroke-width="1.5"'), 10),
     ],

@@ -69,8 +69,11 @@ def pen_width(mask: Bools) -> float:
     return max(THINNEST, 2 * float(np.quantile(away[ridge], USUAL)) - 1) if ridge.any() else THINNEST
 
 
-def split(ink: Ink, *, mixed: bool) -> Split:
-    """Tell lines from what is much broader: areas if ``mixed``, else dots and what rings fill."""
+def split(ink: Ink, *, mixed: bool, ring_width: float | None = None) -> Split:
+    """Tell lines from what is much broader: areas if ``mixed``, else dots and what rings fill.
+
+    ``ring_width``: that of all rings, if they have a given one [px]: no dot is broader.
+    """
     width = pen_width(ink.mask)
     if mixed:
         width = min(width, max(THINNEST, WIDEST * max(ink.mask.shape)))
@@ -78,8 +81,11 @@ def split(ink: Ink, *, mixed: bool) -> Split:
     if (away <= BROAD * width).all():
         return Split(ink, width)
     labels = _broad_parts(ink.mask, away, width)
-    found = _with_areas if mixed else _with_dots_and_rings
-    return found(ink, labels, away, width)
+    if mixed:
+        return _with_areas(ink, labels, width)
+    if ring_width is None:
+        return _with_dots_and_rings(ink, labels, away, width, _find_dots(ink, labels))
+    return _with_dots_and_rings(ink, labels, away, max(THINNEST, ring_width), {})
 
 
 def _broad_parts(mask: Bools, away: Floats, width: float) -> Ints:
@@ -101,7 +107,7 @@ def _broad_parts(mask: Bools, away: Floats, width: float) -> Ints:
     return np.asarray(labels)
 
 
-def _with_areas(ink: Ink, labels: Ints, away: Floats, width: float) -> Split:
+def _with_areas(ink: Ink, labels: Ints, width: float) -> Split:
     lines = ink.mask & (labels == 0)
     edge = dilated(labels > 0, 3) & (~lines | (ink.cover < 1))
     cover = np.where(edge, ink.cover, 0).astype(np.float32)
@@ -109,17 +115,21 @@ def _with_areas(ink: Ink, labels: Ints, away: Floats, width: float) -> Split:
     return Split(thin, width, areas=Areas(labels, cover), apart=labels > 0)
 
 
-def _with_dots_and_rings(ink: Ink, labels: Ints, away: Floats, width: float) -> Split:
-    """Return the round ones of broad parts as dots, and the others hollow but for a line around them."""
-    dots, numbers = [], []
+def _find_dots(ink: Ink, labels: Ints) -> dict[int, Dot]:
+    """Return the dots among broad parts, by the parts' numbers."""
+    dots = {}
     for number, box in enumerate(bounding_boxes(labels - 1, int(labels.max())), 1):
         left, top = max(0, box.left - 1), max(0, box.top - 1)
         window = np.s_[top : box.bottom + 1, left : box.right + 1]
         dot = _as_dot(np.where(dilated(labels[window] == number, 3), ink.cover[window], 0))
         if dot is not None:
-            dots.append(dot._replace(place=dot.place + (left, top)))
-            numbers.append(number)
-    round_ = np.isin(labels, numbers)
+            dots[number] = dot._replace(place=dot.place + (left, top))
+    return dots
+
+
+def _with_dots_and_rings(ink: Ink, labels: Ints, away: Floats, width: float, dots: dict[int, Dot]) -> Split:
+    """Return broad parts that are no dots hollow but for a line around them, and rings that fill these."""
+    round_ = np.isin(labels, list(dots))
     inner = (away > width) & (labels > 0) & ~round_
     rings: list[Floats] = []
     step = (1 - OVERLAP) * width
@@ -130,7 +140,7 @@ def _with_dots_and_rings(ink: Ink, labels: Ints, away: Floats, width: float) -> 
         rings += [ring.reshape(-1, 2) + 0.5 for ring in found if len(ring) > 4]
     covered = dilated(round_, 3) & (labels == 0) & ~ink.mask | round_ | inner
     thin = replace(ink, mask=ink.mask & ~covered, cover=np.where(covered, 0, ink.cover).astype(np.float32))
-    return Split(thin, width, rings, dots, apart=round_ if dots else None)
+    return Split(thin, width, rings, list(dots.values()), apart=round_ if dots else None)
 
 
 def _as_dot(cover: Floats) -> Dot | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -40,12 +41,14 @@ def find_chains(graph: Graph, pens: Ints) -> list[tuple[Floats, bool, int]]:
     following: dict[End, End] = {}
     for node, ends in enumerate(graph.at):
         arms, kinds = [_arm(graph, end, node) for end in ends], [int(pens[n]) for n, _ in ends]
-        pairs = [(0, 1)] if len(ends) == 2 else joined_arms(arms, kinds)[0]  # two are those of a ring
+        # Two are those of a ring, or of a corner.
+        pairs = [(0, 1)] if len(ends) == 2 and kinds[0] == kinds[1] else joined_arms(arms, kinds)[0]
         for i, j in pairs:
             following |= {ends[i]: ends[j], ends[j]: ends[i]}
+    tips = {node for node, ends in enumerate(graph.at) if len(ends) > 1 and following.keys().isdisjoint(ends)}
     chains = []
     for run, closed in runs_of(len(graph.edges), following):
-        points, is_ring = _traced(graph, [graph.edge_from(end) for end in run], closed=closed)
+        points, is_ring = _traced(graph, run, tips, closed=closed)
         chains.append((points, is_ring, int(pens[run[0][0]])))
     return chains
 
@@ -99,9 +102,12 @@ def joined_arms(arms: list[Arm], kinds: list[int]) -> tuple[Pairs, float]:
     return pairs, total + END * len(left)
 
 
-def _traced(graph: Graph, edges: list[Edge], *, closed: bool) -> tuple[Floats, bool]:
-    """Return points along edges that no junction bends, and whether they are a ring."""
-    parts = []
+def _traced(graph: Graph, run: list[End], tips: set[int], *, closed: bool) -> tuple[Floats, bool]:
+    """Return points along edges that no junction bends, and whether they are a ring.
+
+    ``tips``: nodes where several lines end and none goes on, to which they lead; other ends are straight.
+    """
+    edges, parts = [graph.edge_from(end) for end in run], []
     for edge in edges:
         along = arc_lengths(edge.points)
         before, after = (graph.radii[n] if len(graph.at[n]) != 2 else 0.0 for n in edge.nodes)
@@ -109,8 +115,18 @@ def _traced(graph: Graph, edges: list[Edge], *, closed: bool) -> tuple[Floats, b
     points = np.concatenate(parts)
     closed = closed and len(points) > 1
     if not closed:
-        points = np.concatenate([edges[0].points[:1], points, edges[-1].points[-1:]])
+        ends = (run[0], edges[0].nodes[0]), ((run[-1][0], 1 - run[-1][1]), edges[-1].nodes[1])
+        begin, stop = (
+            graph.places[node] if node in tips else _ahead(_arm(graph, end, node), graph.places[node])
+            for end, node in ends
+        )
+        points = np.concatenate([begin[None], points, stop[None]])
     return smoothed(points, closed=closed)
+
+
+def _ahead(arm: Arm, place: Floats) -> Floats:
+    """Return the point beside a junction's place to which an arm leads straight."""
+    return arm.place + min(float(((place - arm.place) * arm.direction).sum()), 0.0) * arm.direction
 
 
 def smoothed(points: Floats, *, closed: bool) -> tuple[Floats, bool]:
@@ -139,34 +155,117 @@ def with_crossings(graph: Graph) -> Graph:
     """Return a skeleton in which lines that cross meet in one node each."""
     while True:
         used: set[int] = set()
-        overlaps = []
-        for number in np.argsort([edge.length() for edge in graph.edges], kind="stable").tolist():
-            edge = graph.edges[number]
-            if used.isdisjoint(edge.nodes) and _is_overlap(graph, number):
-                overlaps.append(number)
-                used.update(edge.nodes)
+        overlaps: list[int] = []
+        arms = [[_arm(graph, end, node) for end in ends] for node, ends in enumerate(graph.at)]
+        costs = [joined_arms(own, [0] * len(own))[1] if len(own) > 2 else 0.0 for own in arms]
+        for numbers in _inner(graph):
+            nodes = {node for number in numbers for node in graph.edges[number].nodes}
+            if used.isdisjoint(nodes) and _are_overlaps(graph, numbers, nodes, arms, costs):
+                overlaps += numbers
+                used |= nodes
         if not overlaps:
             return graph
         graph = contracted(graph, overlaps)
 
 
-def _is_overlap(graph: Graph, number: int) -> bool:
-    """Return whether the lines that meet at both ends of an edge bend less, and end less often, without it.
+def _inner(graph: Graph) -> list[tuple[int, ...]]:
+    """Return the edges from one junction to another, the shortest first.
 
-    Together they must cover it.
+    Pairs that meet follow, of edges that are no longer than the ink of their junctions is wide.
     """
-    edge = graph.edges[number]
-    a, b = edge.nodes
-    if a == b or min(len(graph.at[a]), len(graph.at[b])) < 3:
-        return False
-    sides = [[_arm(graph, end, node) for end in graph.at[node] if end[0] != number] for node in (a, b)]
-    together = sides[0] + sides[1]
+    crowded = [len(ends) > 2 for ends in graph.at]
+    lengths = {
+        number: edge.length()
+        for number, edge in enumerate(graph.edges)
+        if edge.nodes[0] != edge.nodes[1] and crowded[edge.nodes[0]] and crowded[edge.nodes[1]]
+    }
+    short = {
+        n for n, length in lengths.items() if length <= 1 + graph.radii[list(graph.edges[n].nodes)].sum()
+    }
+    pairs = {
+        pair
+        for ends in graph.at
+        for pair in itertools.combinations(sorted(short.intersection(number for number, _ in ends)), 2)
+    }
+    chosen = [*((number,) for number in lengths), *pairs]
+    return sorted(chosen, key=lambda each: (len(each), sum(lengths[number] for number in each), each))
+
+
+def _are_overlaps(
+    graph: Graph, numbers: tuple[int, ...], nodes: set[int], arms: list[list[Arm]], costs: list[float]
+) -> bool:
+    """Return whether the lines that meet at edges bend less, and end less often, without these.
+
+    Together they must cover them, and other edges that ``contracted`` leaves out with them.
+
+    Args:
+        graph: A skeleton.
+        numbers: Of the edges.
+        nodes: Where they begin and end.
+        arms: Of each node, in the order of its ends.
+        costs: Of joining the arms of each node.
+    """
+    together = [
+        arm
+        for node in sorted(nodes)
+        for arm, end in zip(arms[node], graph.at[node], strict=True)
+        if end[0] not in numbers
+    ]
     pairs, cost = joined_arms(together, [0] * len(together))
-    apart = 0.0
-    for end, side in enumerate(sides):
-        arms = [_arm(graph, (number, end), edge.nodes[end]), *side]
-        apart += joined_arms(arms, [0] * len(arms))[1]
-    return cost + END <= apart and _are_covering(together, pairs, edge)
+    if cost + END > sum(costs[node] for node in sorted(nodes)):
+        return False
+    place = graph.places[sorted(nodes)].mean(axis=0)
+    radius = max(float(graph.radii[node] + hypot(*(graph.places[node] - place))) for node in nodes)
+    inner = {
+        number
+        for node in nodes
+        for number, _ in graph.at[node]
+        if nodes.issuperset(graph.edges[number].nodes)
+    }
+    gone = [n for n in sorted(inner) if (hypot(*(graph.edges[n].points - place).T) <= radius).all()]
+    return all(_are_covering(together, pairs, graph.edges[n]) for n in {*gone, *numbers})
+
+
+def with_corners(graph: Graph) -> Graph:
+    """Return a skeleton in which lines that meet at an acute angle do so where their ink ends.
+
+    On the way there they are one edge, past whose tip both lead, if they go straight on, within their ink.
+    """
+    edges, places, gone = list(graph.edges), graph.places.copy(), set[int]()
+    for node, ends in enumerate(graph.at):
+        tips = {end: graph.edge_from(end).nodes[1] for end in ends if len(ends) == 3}
+        stems = [
+            (_missed(graph, node, end, tip), end) for end, tip in tips.items() if len(graph.at[tip]) == 1
+        ]
+        away, stem = min(stems, default=(math.inf, (0, 0)))
+        radius = float(graph.radii[node])
+        if away <= radius + 1:
+            gone.add(stem[0])
+            places[node] = graph.places[tips[stem]]
+            for number, begin in tips.keys() - {stem}:
+                edges[number] = _led_to(edges[number], begin, places[node], radius)
+    kept = [edge for number, edge in enumerate(edges) if number not in gone]
+    return Graph(kept, places, graph.radii)
+
+
+def _missed(graph: Graph, node: int, stem: End, tip: int) -> float:
+    """Return how far past the tip of an edge lines lead that come from both sides of it, the farther of both.
+
+    Infinite if they go on in one another.
+    """
+    arms = [_arm(graph, end, node) for end in graph.at[node] if end != stem]
+    if bending(*arms) < 2 * END:
+        return math.inf
+    ways = [(graph.places[tip] - arm.place, arm.direction) for arm in arms]
+    return max(abs(float(way[0] * ahead[1] - way[1] * ahead[0])) for way, ahead in ways)
+
+
+def _led_to(edge: Edge, end: int, tip: Floats, radius: float) -> Edge:
+    """Return an edge that ends at a tip instead, to which it goes straight from a radius before its end."""
+    points, radii = edge.points[:: 1 - 2 * end], edge.radii[:: 1 - 2 * end]
+    low = min(int(np.searchsorted(arc_lengths(points), radius)), len(points) - 1)
+    points, radii = np.concatenate([tip[None], points[low:]]), np.concatenate([radii[:1], radii[low:]])
+    return Edge(points[:: 1 - 2 * end], radii[:: 1 - 2 * end], edge.nodes)
 
 
 def _are_covering(arms: list[Arm], pairs: Pairs, edge: Edge) -> bool:

@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from warpsplat.drawing.strokes.broad import Areas, Split, distance_from, split
-from warpsplat.drawing.strokes.chains import find_chains, smoothed, with_crossings
+from warpsplat.drawing.strokes.chains import find_chains, smoothed, with_corners, with_crossings
 from warpsplat.drawing.strokes.ink import FAINT, Ink, across, middles, with_thin
 from warpsplat.drawing.strokes.pens import find_pens, line_colors
 from warpsplat.drawing.strokes.skeleton import find_graph
@@ -83,18 +83,21 @@ class TracedLines:
         )
 
 
-def trace_ink(ink: Ink, *, mixed: bool = False, only_lines: bool = False) -> TracedLines:
+def trace_ink(
+    ink: Ink, *, mixed: bool = False, only_lines: bool = False, ring_width: float | None = None
+) -> TracedLines:
     """Find the centre lines of ink, and their pens; through junctions they go straight on.
 
     Args:
         ink: Of the image.
         mixed: Whether its broad parts stay areas, which are not traced.
         only_lines: Whether it has no broad parts, however wide it is.
+        ring_width: As for ``split``.
     """
-    parts = Split(ink) if only_lines else split(ink, mixed=mixed)
+    parts = Split(ink) if only_lines else split(ink, mixed=mixed, ring_width=ring_width)
     fine = 2 if ink.mask.size <= FINE_PIXELS else 1
     graph = find_graph(parts.thin.mask if fine == 1 else _enlarged(parts.thin, fine))
-    graph = with_crossings(graph)
+    graph = with_corners(with_crossings(graph))
     places: list[list[Floats]] = [
         [edge.points / fine for edge in graph.edges],
         parts.rings,

@@ -14,3 +14,10 @@ def points_at(cubics: Floats, t: Floats) -> Floats:
     return np.stack(
         [sum(w * cubics[..., k, axis, None] for k, w in enumerate(weights)) for axis in (0, 1)], axis=-1
     )
+
+
+def from_parameter(cubic: Floats, t: float) -> Floats:
+    """Return a cubic (4, 2) from a parameter to its end; from below 0 it goes on before its beginning."""
+    first = cubic[:-1] + t * np.diff(cubic, axis=0)
+    second = first[:-1] + t * np.diff(first, axis=0)
+    return np.stack([second[0] + t * (second[1] - second[0]), second[1], first[2], cubic[3]])
