@@ -53,11 +53,11 @@ def halved(image: Floats) -> Floats:
     """
     light = filters.grey(image[..., :3])[..., None]
     found = image.copy()
-    found[..., :3] = np.clip(np.round(light + _halved(image[..., :3] - light)), 0, 255)
+    found[..., :3] = np.clip(np.round(light + halved_planes(image[..., :3] - light)), 0, 255)
     return found
 
 
-def _halved(values: Floats) -> Floats:
+def halved_planes(values: Floats) -> Floats:
     """Return values, shape (height, width, channel), averaged over squares of two pixels and interpolated."""
     height, width = values.shape[:2]
     small = filters.boxed(values, 2)
@@ -72,7 +72,7 @@ def with_sharp_colors(image: FloatArray) -> FloatArray:
     """
     levels = np.round(image[..., :3].astype(np.float64) * 255)
     light = filters.grey(levels)[..., None]
-    colors, soft = levels - light, _halved(light)
+    colors, soft = levels - light, halved_planes(light)
     mean, means = filters.box_blur(soft, WINDOW), filters.box_blur(colors, WINDOW)
     spread = np.maximum(filters.box_blur(soft * soft, WINDOW) - mean * mean, 0)
     both = filters.box_blur(colors * soft, WINDOW) - means * mean
