@@ -8,10 +8,9 @@ import numpy as np
 from PIL import Image, ImageFilter
 
 import warpsplat
-from tests.drawing.test_chroma import as_file
 from tests.drawing.test_optics import BOX, pixels, show
 from tests.drawing.trace.drawings import draw
-from warpsplat.drawing.optics import NONE, SCALE, Seen
+from warpsplat.drawing.optics import SCALE, Seen
 from warpsplat.drawing.seen_colors import MOST_COLORS, with_seen_colors
 from warpsplat.scene import Scene
 from warpsplat.svg.viewer import on_white, render_svg
@@ -42,17 +41,6 @@ def test_the_ink_of_thin_lines_is_what_it_was() -> None:
     np.testing.assert_allclose(255 * found.colors[is_ink], [INK] * is_ink.sum(), atol=4)
     np.testing.assert_array_equal(found.colors[~is_ink], true.colors[~is_ink])
     np.testing.assert_array_equal(found.points, true.points)
-
-
-def test_the_ink_of_thin_lines_is_found_through_halved_colours() -> None:
-    big = Image.fromarray(np.asarray(on_white(render_svg(SVG.format(768)))).astype(np.uint8))
-    seen, true = Seen.of(as_file(pixels(big.resize((96, 96), BOX)), quality=95, subsampling=2)), scene()
-    assert seen.is_halved
-    is_ink = (np.abs(255 * true.colors - INK) < 1).all(axis=1)
-    wrong = replace(true, colors=np.where(is_ink[:, None], np.float32([0.35, 0.2, 0.3]), true.colors))
-    found = with_seen_colors(wrong, seen, NONE, show)
-    np.testing.assert_allclose(255 * found.colors[is_ink], [INK] * is_ink.sum(), atol=4)
-    np.testing.assert_array_equal(found.colors[~is_ink], true.colors[~is_ink])
 
 
 def test_right_colours_stay() -> None:

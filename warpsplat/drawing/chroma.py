@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats
-from warpsplat.drawing.trace.regions import NEGLIGIBLE_NOISE
 from warpsplat.drawing.trace.seeds import ROUNDING, noise_of
 from warpsplat.portable import filters
 from warpsplat.scene import FloatArray
@@ -34,7 +33,7 @@ def has_blurred_colors(image: FloatArray) -> bool:
     if image.shape[2] == 4 and image[..., 3].min() < 1:
         return False
     image = image[..., :3]
-    if noise_of(image * np.float32(255)) < NEGLIGIBLE_NOISE:
+    if not noise_of(image * np.float32(255)):
         return False
     light = filters.grey(image)[..., None]
     return _sharpness(image - light) < BLURRED * _sharpness(light)
@@ -53,11 +52,11 @@ def halved(image: Floats) -> Floats:
     """
     light = filters.grey(image[..., :3])[..., None]
     found = image.copy()
-    found[..., :3] = np.clip(np.round(light + halved_planes(image[..., :3] - light)), 0, 255)
+    found[..., :3] = np.clip(np.round(light + _halved(image[..., :3] - light)), 0, 255)
     return found
 
 
-def halved_planes(values: Floats) -> Floats:
+def _halved(values: Floats) -> Floats:
     """Return values, shape (height, width, channel), averaged over squares of two pixels and interpolated."""
     height, width = values.shape[:2]
     small = filters.boxed(values, 2)
@@ -72,7 +71,7 @@ def with_sharp_colors(image: FloatArray) -> FloatArray:
     """
     levels = np.round(image[..., :3].astype(np.float64) * 255)
     light = filters.grey(levels)[..., None]
-    colors, soft = levels - light, halved_planes(light)
+    colors, soft = levels - light, _halved(light)
     mean, means = filters.box_blur(soft, WINDOW), filters.box_blur(colors, WINDOW)
     spread = np.maximum(filters.box_blur(soft * soft, WINDOW) - mean * mean, 0)
     both = filters.box_blur(colors * soft, WINDOW) - means * mean

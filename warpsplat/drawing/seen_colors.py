@@ -1,8 +1,4 @@
-"""Flat colours by least squares through optics: no pixel may show that of a letter or a line.
-
-Where colours have half the resolution of lightness, lightness is solved for first, and then how far the
-channels are from it, whose shares are halved.
-"""
+"""Flat colours by least squares through optics: no pixel may show that of a letter or a line."""
 
 from __future__ import annotations
 
@@ -11,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.chroma import halved_planes
 from warpsplat.drawing.optics import RIDGE, Kernel, Seen
 from warpsplat.drawing.trace.grids import Floats, channel_max
 from warpsplat.drawing.trace.seeds import ROUNDING
-from warpsplat.portable import filters
 from warpsplat.portable.linear import product, solve
 from warpsplat.scene import FloatArray, Paint, Scene
 
@@ -40,7 +34,7 @@ def with_seen_colors(scene: Scene, seen: Seen, kernel: Kernel, draw: Callable[[S
     colors, number = np.unique(
         np.round(255 * np.concatenate([scene.colors[is_flat], beyond])), axis=0, return_inverse=True
     )
-    if not 0 < len(colors) <= MOST_COLORS or (seen.is_halved and seen.edges.is_linear):
+    if not 0 < len(colors) <= MOST_COLORS or seen.is_halved:
         return scene
     number = number.reshape(-1)
 
@@ -51,7 +45,7 @@ def with_seen_colors(scene: Scene, seen: Seen, kernel: Kernel, draw: Callable[[S
         canvas = scene.canvas if ground is None else replace(scene.canvas, background=values[-1])
         return replace(scene, colors=own, stop_colors=stops, canvas=canvas)
 
-    some = np.nonzero(seen.near_edges | seen.is_halved)
+    some = np.nonzero(seen.near_edges)
     black, shares = (np.zeros_like(scene.colors), np.zeros_like(scene.stop_colors)), []
     for first in range(0, len(colors), 3):
         unit = np.eye(len(colors), 3, -first)
@@ -67,27 +61,15 @@ def with_seen_colors(scene: Scene, seen: Seen, kernel: Kernel, draw: Callable[[S
     shown = np.array(
         [(channel_max(np.abs(plain - color)) <= ROUNDING + seen.noise).sum() for color in colors]
     )
-
-    def solved(share: Floats, goal: Floats, before: Floats) -> Floats:
-        """Return the values of colours whose mixtures by shares (pixel, color) are nearest to a goal."""
-        own = share.T
-        normal = np.array([[(one * other).sum() for one in own] for other in own])
-        held = RIDGE * np.diag(normal) + shown + 1e-6
-        right = np.array([(one * goal).sum() for one in own]) + held * before
-        return solve(normal + np.diag(held), right)
-
-    if seen.is_halved:
-        grey, greys = filters.grey(light), filters.grey(before)
-        soft = halved_planes(share.reshape(*seen.levels.shape[:2], -1)).reshape(share.shape)
-        soft, rest = np.round(soft * STEPS) / STEPS, np.round(16 * (light - grey[:, None])) / 16
-        lightness = solved(share, np.round(16 * grey) / 16, greys)
-        for channel in range(3):
-            after[:, channel] = lightness + solved(soft, rest[:, channel], before[:, channel] - greys)
-    for channel in range(0 if seen.is_halved else 3):
+    for channel in range(3):
         goal, now = light[:, channel], product(share, before[:, channel])
         # What is beyond black or white tells no more than that.
         free = ~(((goal <= 0) & (now < 0)) | ((goal >= 255) & (now > 255)))
-        after[:, channel] = solved(share[free], goal[free], before[:, channel])
+        own = share[free].T
+        normal = np.array([[(one * other).sum() for one in own] for other in own])
+        held = RIDGE * np.diag(normal) + shown + 1e-6
+        right = np.array([(one * goal[free]).sum() for one in own]) + held * before[:, channel]
+        after[:, channel] = solve(normal + np.diag(held), right)
     found = seen.in_srgb(after)
     is_off = np.abs(found - colors).max(axis=1, keepdims=True) > ROUNDING + seen.noise
     return painted(np.where(is_off, found, colors) / 255, scene.colors, scene.stop_colors)
