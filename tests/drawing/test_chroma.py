@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from PIL import Image
 
 from tests.drawing.trace.drawings import draw_exactly, ground
 from tests.runs import vectorize
-from warpsplat.drawing import chroma
-from warpsplat.drawing.denoise import has_blurred_colors
+from warpsplat import metrics
+from warpsplat.drawing import picture as pictures
+from warpsplat.drawing.chroma import halved, has_blurred_colors, with_sharp_colors
+from warpsplat.drawing.optics import NONE, SCALE, Seen
+from warpsplat.drawing.picture import Picture
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -22,14 +26,26 @@ SHAPES = (
     + '<path d="M48.3 8.4C71 14 82 33 86.2 70.7L60.6 62.3Q48 91 30.7 88.2L9.6 30.4Z" fill="#c01850"/>'
 )
 
+LINES = ground("#fff", 96, 96) + "".join(
+    f'<path d="M{8 + 16 * i} 6l1.4-.2 6 80-1.4.2z" fill="{color}"/>'
+    for i, color in enumerate(["#d01020", "#1030c0", "#108040", "#d01020", "#1030c0"])
+)
+"""Thin lines in strong colours."""
+
+
+def as_file(image: FloatArray, kind: str = "jpeg", **options: int) -> FloatArray:
+    """Return an image as a JPEG or WebP shows it."""
+    file = io.BytesIO()
+    Image.fromarray(np.round(image * 255).astype(np.uint8)).save(file, kind, **options)
+    return np.asarray(Image.open(file), np.float32) / np.float32(255)
+
 
 def as_jpeg(image: FloatArray, subsampling: int) -> FloatArray:
-    """Return an image as a JPEG shows it."""
-    file = io.BytesIO()
-    Image.fromarray(np.round(image * 255).astype(np.uint8)).save(
-        file, "jpeg", quality=75, subsampling=subsampling
-    )
-    return np.asarray(Image.open(file), np.float32) / np.float32(255)
+    return as_file(image, quality=75, subsampling=subsampling)
+
+
+def psnr(a: FloatArray, b: FloatArray) -> float:
+    return metrics.psnr(255 * a, 255 * b)
 
 
 @pytest.fixture(scope="module")
@@ -37,24 +53,79 @@ def image() -> FloatArray:
     return draw_exactly(SHAPES, 96, 96)
 
 
+@pytest.fixture(scope="module")
+def lines() -> FloatArray:
+    return draw_exactly(LINES, 96, 96)
+
+
 def test_colours_are_blurred_by_subsampling_only(image: FloatArray) -> None:
-    grey = np.repeat(image[..., :1], 3, axis=2)
+    grey, clear = np.repeat(image[..., :1], 3, axis=2), image[..., :1] * 0 + np.float32(0.5)
     assert has_blurred_colors(as_jpeg(image, 2))
     assert not has_blurred_colors(image)
     assert not has_blurred_colors(as_jpeg(image, 0))
     assert not has_blurred_colors(as_jpeg(grey, 2))
-    assert not has_blurred_colors(np.concatenate([as_jpeg(image, 2), image[..., :1] * 0 + 1], axis=2))
+    assert not has_blurred_colors(np.concatenate([as_jpeg(image, 2), clear], axis=2))
 
 
-def test_outlines_follow_the_lightness(
-    image: FloatArray, device: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("kind", ["jpeg", "webp"])
+def test_halved_is_what_files_do(lines: FloatArray, kind: str) -> None:
+    levels = np.round(255 * lines)
+    file = np.round(255 * as_file(lines, kind, quality=100))
+    assert psnr(halved(levels) / 255, file / 255) > psnr(levels / 255, file / 255) + 6
+
+
+def test_halved_keeps_lightness_flat_colours_and_odd_sizes(image: FloatArray) -> None:
+    levels = np.round(80 + 100 * image[:95, :93])  # nothing is clipped
+    through = halved(levels)
+    shares = np.array([0.299, 0.587, 0.114])
+    assert through.shape == levels.shape
+    assert np.abs((through - levels) @ shares).max() <= 1
+    np.testing.assert_array_equal(through[:3, :3], levels[:3, :3])
+
+
+def test_colours_become_as_sharp_as_lightness(image: FloatArray, lines: FloatArray) -> None:
+    for each in (image, lines):
+        soft = as_file(each, quality=95, subsampling=2)
+        assert psnr(with_sharp_colors(soft), each) > psnr(soft, each) + 3
+
+
+def test_flat_colours_stay(image: FloatArray) -> None:
+    levels = np.round(255 * image)
+    sharp = 255 * with_sharp_colors(halved(levels) / np.float32(255))
+    np.testing.assert_allclose(sharp[:4, :4], levels[:4, :4], atol=1)
+    np.testing.assert_allclose(sharp[36:40, 36:40], levels[36:40, 36:40], atol=1)
+
+
+def test_a_frame_begins_where_a_square_of_pixels_does(lines: FloatArray) -> None:
+    wide = np.pad(lines, [(21, 16), (19, 16), (0, 0)], mode="edge")
+    picture = Picture.of(as_file(wide, quality=95, subsampling=2))
+    assert picture.is_halved
+    assert picture.seen is not None
+    assert picture.seen.shape == picture.pixels.shape
+    np.testing.assert_array_equal(picture.corner % 2, 0)
+
+
+def test_what_a_drawing_lacks_is_found_through_halved_colours(image: FloatArray) -> None:
+    """The picture without the optics of the true drawing is about the drawing; no kernel is looked for."""
+    seen = Seen.of(as_file(image, quality=95, subsampling=2))
+    assert seen.is_halved
+    fine = draw_exactly(f'<g transform="scale({SCALE})">{SHAPES}</g>', SCALE * 96, SCALE * 96)
+    found = replace(seen, has_kernel=False).find(fine)
+    assert found.kernel == NONE
+    assert psnr(found.undone, image) > psnr(seen.levels / 255, image) + 6
+    assert psnr(found.shown, seen.levels / 255) > psnr(image, seen.levels / 255) + 6
+
+
+def test_thin_lines_keep_their_colours(
+    lines: FloatArray, device: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    large = draw_exactly(f'<g transform="scale(4)">{SHAPES}</g>', 384, 384)
+    image = as_file(lines, quality=95, subsampling=2)
+    large = draw_exactly(f'<g transform="scale(4)">{LINES}</g>', 384, 384)
 
-    def error() -> float:
-        made = vectorize(as_jpeg(image, 2), make_settings(subject="drawing"), Backend.on(device))
-        return float(((render(made.scene, scale=4) - large) ** 2).mean())
+    def figure() -> float:
+        made = vectorize(image, make_settings(subject="drawing"), Backend.on(device))
+        return psnr(render(made.scene, scale=4), large)
 
-    by_lightness = error()
-    monkeypatch.setattr(chroma, "CHROMA_WEIGHT", 1.0)
-    assert by_lightness < min(2.5e-5, 0.5 * error())
+    sharp = figure()
+    monkeypatch.setattr(pictures, "has_blurred_colors", lambda _: False)
+    assert sharp > max(38, figure() + 6)

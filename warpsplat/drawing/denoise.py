@@ -17,12 +17,6 @@ from warpsplat.drawing.trace.regions import MOST_NOISE, NEGLIGIBLE_NOISE
 from warpsplat.drawing.trace.seeds import OUTLIERS, noise_of
 from warpsplat.scene import FloatArray
 
-LIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
-"""Shares of the channels in what JPEG keeps at full resolution (ITU-T T.871)."""
-
-BLURRED = 0.75
-"""Sharpness of colours over that of lightness, below which their resolution is lower."""
-
 LEAST_FLAT = 16
 """Pixels of a flat colour: a block of four by four."""
 
@@ -33,14 +27,13 @@ WINDOW = 9
 def without_noise(image: FloatArray) -> tuple[FloatArray, float | None]:
     """Return an image whose flat colours have no noise, and the noise that mixtures of colours still have.
 
-    Without noise the image stays as it is. So it does without flat colours, and where colours have half the
-    resolution, as pixels beside edges are no mixtures then; the noise is None in these cases.
+    Without noise the image stays as it is. So it does without flat colours; the noise is None then.
     """
     levels = np.asarray(image, np.float32) * 255
     noise = noise_of(levels)
     if not noise:
         return image, 0.0
-    if noise > MOST_NOISE or has_blurred_colors(image):
+    if noise > MOST_NOISE:
         return image, None
     whole = np.round(levels).astype(np.int32)
     reach = math.ceil(2 * noise) + 1
@@ -84,20 +77,3 @@ def _flatten(clean: Floats, whole: Ints, color: Ints, reach: int, noise: float) 
 def _sums(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Return the sums of whole numbers in the square around each pixel, exactly."""
     return np.asarray(cv2.boxFilter(values, cv2.CV_32F, (WINDOW, WINDOW), normalize=False), np.float32)
-
-
-def has_blurred_colors(image: FloatArray) -> bool:
-    """Return whether an image has noise, and the edges of its colours are less sharp than those of lightness.
-
-    ``image``: as for ``finish_drawing``; one with opacity is no JPEG.
-    """
-    if image.shape[2] != 3 or noise_of(image * np.float32(255)) < NEGLIGIBLE_NOISE:
-        return False
-    light = (image * LIGHTNESS).sum(axis=2, keepdims=True)
-    return _sharpness(image - light) < BLURRED * _sharpness(light)
-
-
-def _sharpness(image: FloatArray) -> float:
-    """Return the sum of the squared second differences along rows and columns over that of the first ones."""
-    sums = [sum(float((np.diff(image, n, axis) ** 2).sum()) for axis in (0, 1)) for n in (1, 2)]
-    return sums[1] / sums[0] if sums[0] > 0 else np.inf

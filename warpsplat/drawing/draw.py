@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import Sheet
@@ -16,6 +18,7 @@ from warpsplat.drawing.optics import SCALE
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import TRACED_PSNR
+from warpsplat.drawing.trace.regions import smoothed
 from warpsplat.drawing.without_optics import without_optics
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished, shown_image
@@ -129,6 +132,8 @@ def _traced(
     """Trace a picture; its glyphs on a sheet, if it has some and may have (``has_sheet``)."""
 
     def trace(pixels: FloatArray, most: int | None) -> Drawing:
+        if picture.is_halved and picture.noise:  # told before colours were made sharp, as less is seen after
+            pixels = smoothed(pixels * np.float32(255), picture.noise) / np.float32(255)
         traced = trace_in_time(pixels, picture.noise, most, price, settings, run)
         drawing = Drawing(traced.scene, traced.joints)
         if settings.is_limited:
@@ -160,9 +165,12 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
 
     if settings.optics == "none":
         return picture, trace(picture.pixels)
-    pixels, found = without_optics(picture.pixels, picture.noise, trace, show, run.over)
-    seen = None if pixels is picture.pixels else picture.pixels
-    return replace(picture, pixels=pixels, seen=seen), found
+    seen = picture.seen if picture.is_halved else None
+    pixels, found = without_optics(picture.pixels, picture.noise, trace, show, run.over, seen)
+    if pixels is picture.pixels:
+        return picture, found
+    seen = picture.pixels if seen is None else seen
+    return replace(picture, pixels=pixels, seen=seen, has_kernel=True), found
 
 
 def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price: float) -> Fit:
@@ -177,7 +185,8 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
         done = _finish(settings, found.rest, found.drawing, next(runs), grid=glyphs.per_pixel, **options)
         scene = limited(found.sheet.placed(glyphs.drawing.scene, done.drawing.scene), settings)
     else:
-        done = _finish(settings, found.rest, found.drawing, run, seen=picture.seen, **options)
+        options |= {"seen": picture.seen, "has_kernel": picture.has_kernel}
+        done = _finish(settings, found.rest, found.drawing, run, **options)
         scene = done.drawing.scene
     scene = picture.placed(scene)
     if settings.strokes and settings.tidy and not run.over():
@@ -187,22 +196,20 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
     psnr = done.psnr - 10 * float(elementary.log10(picture.share))
     grid = done.per_pixel / float(picture.enlargement.mean())
     scene = simple(rounded(scene, grid), grid)
-    is_sharper = picture.is_interpolated or picture.seen is not None
+    is_sharper = picture.is_interpolated or picture.has_kernel
     return Fit(scene, grid, psnr, psnr, 0, run.stopped(), is_sharper=is_sharper)
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:
-    """Finish a drawing as ``finish_by_lightness``, with what the settings say beside ``options``.
+    """Finish a drawing as ``finish_drawing``, with what the settings say beside ``options``.
 
     A draft stays as it is.
     """
     if not settings.tidy:
         return Finished(drawing, min(DRAFT_GRID, finest(settings)))
-    from warpsplat.drawing.chroma import finish_by_lightness
+    from warpsplat.drawing.tidy import finish_drawing
 
-    return finish_by_lightness(
-        target, drawing, run, finest=finest(settings), symbols=settings.symbols, **options
-    )
+    return finish_drawing(target, drawing, run, finest=finest(settings), symbols=settings.symbols, **options)
 
 
 def announce_trace(picture: Picture, settings: Settings) -> None:

@@ -1,8 +1,9 @@
 """How a picture was made of sharp shapes.
 
 Scanners, cameras and programs that resize mix colours in sRGB or in linear light, convolve them with a small
-symmetric kernel, and clip what goes beyond black and white. Clean edges tell the light. A sharp image that is
-about right tells the kernel: the one with which it is nearest to the picture. The picture without them is
+symmetric kernel, and clip what goes beyond black and white; JPEG and WebP halve the resolution of colours
+(``chroma``). Clean edges tell the light. A sharp image that is about right tells the kernel: the one with
+which it is nearest to the picture. The picture without them is
 what it is, less what the sharp image becomes through them, plus the sharp image (back projection: Irani and
 Peleg 1991, "Improving resolution by image registration").
 """
@@ -15,7 +16,7 @@ from functools import reduce
 import cv2
 import numpy as np
 
-from warpsplat.drawing.denoise import has_blurred_colors
+from warpsplat.drawing.chroma import halved, has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.edges import LINEAR, MIDDLES, Edges, find_edges
 from warpsplat.drawing.trace.grids import Bools, Box, Floats, Ints, channel_max, dilated
 from warpsplat.drawing.trace.seeds import ROUNDING, noise_of
@@ -82,8 +83,10 @@ class Seen:
     edges: Edges
     noise: float
     """Of flat colours [levels]."""
-    has_colors: bool
-    """Whether its colours have the resolution of its lightness, and tell the optics, too."""
+    is_halved: bool
+    """Whether its colours have half the resolution of its lightness, and so do not tell the kernel."""
+    has_kernel: bool = True
+    """Whether there is a kernel to be found."""
 
     @classmethod
     def of(cls, image: FloatArray, noise: float | None = None) -> Seen:
@@ -93,8 +96,10 @@ class Seen:
         """
         levels = _levels(image)
         noise = noise_of(levels) if noise is None else noise
-        edges, uneven = find_edges(levels, noise), _uneven(levels, ROUNDING + noise)
-        return cls(levels, uneven, edges, noise, not has_blurred_colors(image))
+        is_halved = has_blurred_colors(image)
+        sharp = _levels(with_sharp_colors(image)) if is_halved else levels
+        edges, uneven = find_edges(sharp, noise), _uneven(levels, ROUNDING + noise)
+        return cls(levels, uneven, edges, noise, is_halved)
 
     def part(self, box: Box) -> Seen:
         """Return a part of it."""
@@ -131,11 +136,12 @@ class Seen:
         rings = _rings(fine if light is None else _levels(light), *some)
         steps = self._steps(fine, some)
         kernel, error = self._kernel(rings, steps, some)
-        through = self.in_srgb(_summed(kernel, rings))
         without = _squared(self._planes(self.levels[some] - _rounded(mean[some])))
         undone, shown = self.levels.copy(), _rounded(mean)
-        undone[some] = mean[some] + self._residual(through, steps, some)
-        shown[some] = through
+        shown[some] = self.in_srgb(_summed(kernel, rings))
+        if self.is_halved:
+            shown = halved(shown)
+        undone[some] = mean[some] + self._residual(shown[some], steps, some)
         return Found(kernel, error, without, _image(shown), _image(undone))
 
     def _kernel(self, rings: list[Floats], steps: Floats, some: tuple[Ints, ...]) -> tuple[Kernel, float]:
@@ -153,7 +159,7 @@ class Seen:
 
         kernel, error = NONE, left(NONE)
         told = int(((light > 0) & (light < 255)).sum())
-        for _ in range(ROUNDS if told > len(table) else 0):
+        for _ in range(ROUNDS if self.has_kernel and told > len(table) else 0):
             # Sums of products of whole numbers are exact, and so the same in any order.
             weighted = table * weight
             normal = np.array([[(one * other).sum() for one in weighted] for other in table])
@@ -218,7 +224,7 @@ class Seen:
 
     def _planes(self, pixels: Floats) -> Floats:
         """Return what of pixels (pixel, channel), or sums of them, tells optics, shape (pixel, plane)."""
-        if self.has_colors:
+        if not self.is_halved:
             return pixels
         return np.round((pixels[:, :3] * LIGHTNESS).sum(axis=1, keepdims=True))
 

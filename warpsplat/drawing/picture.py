@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.drawing.chroma import has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.denoise import without_noise
 from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
+from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
@@ -45,6 +47,11 @@ class Picture:
 
     seen: FloatArray | None = None
     """The pixels before they were made sharp, if they were."""
+    has_kernel: bool = False
+    """Whether they were blurred or sharpened by a kernel."""
+    is_halved: bool = False
+    """Whether its colours had half the resolution of its lightness, and were made sharp; flat colours have
+    noise then."""
     is_interpolated: bool = False
     """Whether the image was enlarged by interpolation, which is undone."""
 
@@ -60,16 +67,35 @@ class Picture:
         repeated = np.ascontiguousarray(image[::factor, ::factor])
         small = repeated if before is None else before / np.float32(255)
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
+        is_halved = has_blurred_colors(small)
         pixels, noise = without_noise(small)
+        if is_halved:
+            pixels, noise = with_sharp_colors(small), noise_of(small * np.float32(255))
         size, thin = np.array(pixels.shape[1::-1]), np.array(margins(pixels, THIN_SIDE))
         box = _drawn_box(pixels)
         first, last = (-thin, size + thin) if box is None else (box[0] - MARGIN, box[1] + MARGIN)
+        if is_halved:  # from whole squares of pixels on
+            first = first - first % 2
         low, high = np.maximum(first, 0), np.minimum(last, size)
         widths = [((low - first)[axis], (last - high)[axis]) for axis in (1, 0)]
-        wide = np.pad(pixels[low[1] : high[1], low[0] : high[0]], [*widths, (0, 0)], mode="edge")
+
+        def framed(image: FloatArray) -> FloatArray:
+            wide = np.pad(image[low[1] : high[1], low[0] : high[0]], [*widths, (0, 0)], mode="edge")
+            return np.ascontiguousarray(wide)
+
         drawn = size if box is None else box[1] - box[0]
-        pixels, is_thin = np.ascontiguousarray(wide), bool(thin.any())
-        return cls(pixels, noise, enlargement, first, size, drawn, is_thin, is_interpolated=is_interpolated)
+        return cls(
+            framed(pixels),
+            noise,
+            enlargement,
+            first,
+            size,
+            drawn,
+            bool(thin.any()),
+            seen=framed(small) if is_halved else None,
+            is_halved=is_halved,
+            is_interpolated=is_interpolated,
+        )
 
     @property
     def share(self) -> float:

@@ -34,7 +34,7 @@ def with_seen_colors(scene: Scene, seen: Seen, kernel: Kernel, draw: Callable[[S
     colors, number = np.unique(
         np.round(255 * np.concatenate([scene.colors[is_flat], beyond])), axis=0, return_inverse=True
     )
-    if not 0 < len(colors) <= MOST_COLORS or not seen.has_colors:
+    if not 0 < len(colors) <= MOST_COLORS or seen.is_halved:
         return scene
     number = number.reshape(-1)
 

@@ -60,6 +60,7 @@ def finish_drawing(
     grid: float | None = None,
     negligible: float = LEAST_ERROR,
     seen: FloatArray | None = None,
+    has_kernel: bool = True,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -76,8 +77,12 @@ def finish_drawing(
         negligible: mean squared error below which differences do not count.
         seen: the image before it was made sharp, if ``target`` was: the drawing is fitted so that it is like
             that through the optics, of which both tell more and more. The PSNR is NaN then.
+        has_kernel: whether a kernel is among these optics.
     """
     target = matching(target, drawing.scene.canvas)
+    optics = None
+    if seen is not None:
+        optics = replace(Seen.of(matching(seen, drawing.scene.canvas)), has_kernel=has_kernel)
     if run.over() or not len(drawing.scene):
         return Finished(drawing, grid or min(DRAFT_GRID, finest))
     byte = partial(worth, price=price, negligible=negligible)
@@ -85,12 +90,12 @@ def finish_drawing(
     fit = OutlineFit(target, drawing, run)
     fit.advance(parts[0], FIRST_STEPS, FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
-    fit, target = _through_optics(fit, target, parts[0], seen)
+    fit, target = _through_optics(fit, target, parts[0], optics)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, byte, run.over), run)
         fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
-        fit, target = _through_optics(fit, target, parts[1], seen)
+        fit, target = _through_optics(fit, target, parts[1], optics)
     equal: list[Equal] = []
     if tidy and not run.over():
         exact, worth_of_byte = fit.drawing, byte(fit.error, estimated_size(fit.drawing.scene, DRAFT_GRID))
@@ -117,12 +122,12 @@ def finish_drawing(
 
 
 def _through_optics(
-    fit: OutlineFit, target: FloatArray, run: Run, seen: FloatArray | None
+    fit: OutlineFit, target: FloatArray, run: Run, picture: Seen | None
 ) -> tuple[OutlineFit, FloatArray]:
     """Return a fit to what the optics leave of an image, and that, by what the fit shows."""
-    if seen is None:
+    if picture is None:
         return fit, target
-    picture, draw = Seen.of(matching(seen, fit.drawing.scene.canvas)), partial(render, backend=run.backend)
+    draw = partial(render, backend=run.backend)
     for _ in range(TURNS):
         if run.over():
             break

@@ -50,6 +50,7 @@ def without_optics(
     trace: Callable[[FloatArray], Traced],
     show: Callable[[Scene], FloatArray],
     over: Callable[[], bool],
+    halved: FloatArray | None = None,
 ) -> tuple[FloatArray, Traced]:
     """Return pixels as they were before they were blurred or sharpened, and their trace.
 
@@ -59,11 +60,12 @@ def without_optics(
         trace: Traces such pixels.
         show: Renders a scene, likewise.
         over: Returns whether there is no time left.
+        halved: The pixels before their colours were made as sharp as their lightness, if they were.
 
     Returns:
         ``pixels`` itself if no optics explain it clearly better than its trace does.
     """
-    seen = Seen.of(pixels, noise)
+    seen = Seen.of(pixels if halved is None else halved, noise)
 
     def look(traced: Traced) -> tuple[Found, float]:
         """Return the optics of the trace, and what its error and its size cost with them [dB]."""

@@ -62,7 +62,7 @@ def find_regions(
     if noise is None:
         noise = noise_of(image)
         noise = 0.0 if noise < NEGLIGIBLE_NOISE else noise
-        image = _smoothed(image, noise) if noise else image
+        image = smoothed(image, noise) if noise else image
     noise = min(noise, MOST_NOISE)
     check()
     seeds = find_seeds(image, min(noise, MOST_SEED_NOISE))
@@ -78,12 +78,15 @@ def find_regions(
     return Regions(image, labels, fills, paint, parts.colorings, noise)
 
 
-def _smoothed(image: Floats, noise: float) -> Floats:
-    """Return the image without the traces of JPEG beside edges."""
+def smoothed(image: Floats, noise: float) -> Floats:
+    """Return the image without the traces of JPEG beside edges.
+
+    ``image``: levels, shape (height, width, 3 or 4); ``noise``: of flat regions [levels].
+    """
     smooth = image.copy()
     for channels in (slice(0, 3), slice(3, 4)):
         part = image[..., channels]
-        if np.ptp(part) > 0:
+        if part.size and np.ptp(part) > 0:
             for _ in range(3):
                 part = filters.bilateral(part, 7, SMOOTHED_STEP + SMOOTHED_NOISE * noise, 2.5)
             smooth[..., channels] = part
