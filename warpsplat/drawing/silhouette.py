@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.drawing.constraints import of_contours
-from warpsplat.drawing.cut_out import opacity_on_ground
 from warpsplat.drawing.draw import draw_regions
 from warpsplat.drawing.trace.grids import Bools, Floats
+from warpsplat.drawing.without_background import opacity_on_ground
 from warpsplat.errors import ImageError
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.scene import FloatArray, Scene

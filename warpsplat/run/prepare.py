@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.drawing.cut_out import MOST_PIXELS, cut_out
 from warpsplat.drawing.silhouette import silhouettes
 from warpsplat.drawing.trace.subject import guess_subject
+from warpsplat.drawing.without_background import MOST_PIXELS, without_ground
 from warpsplat.errors import UsageError
 from warpsplat.files.image import ImageFacts
 from warpsplat.files.sources import ImageSource, held, image_of, load_importance, source_name
@@ -144,7 +144,7 @@ def without_background(
     target: FloatArray, settings: Settings, notes: tuple[str, ...]
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """Return a photograph without its background, and notes with one on that."""
-    cut = cut_out(target, everywhere=settings.removal == "everywhere")
+    cut = without_ground(target, everywhere=settings.removal == "everywhere")
     left, color = cut[..., 3].mean(), solid_color(settings.background)
     note = f"the background was removed, {1 - left:.0%} of the image"
     if color is not None:

@@ -53,7 +53,7 @@ def opacity_on_ground(image: FloatArray, *, everywhere: bool) -> FloatArray:
     return np.asarray(np.clip(width_of_edge * (soft - 0.5) + 0.5, 0, 1), np.float32)
 
 
-def cut_out(image: FloatArray, *, everywhere: bool) -> FloatArray:
+def without_ground(image: FloatArray, *, everywhere: bool) -> FloatArray:
     """Return an image with opacity, premultiplied, shape (height, width, 4); arguments as above.
 
     Pixels at edges have the colours of the nearest ones inside, so that nothing of the ground is left.
