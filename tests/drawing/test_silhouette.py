@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import warpsplat
-from warpsplat.drawing.cut_out import cut_out, opacity_on_ground
 from warpsplat.drawing.plain_ground import find_ground
 from warpsplat.drawing.silhouette import by_object
+from warpsplat.drawing.without_background import opacity_on_ground, without_ground
 from warpsplat.errors import ImageError
 from warpsplat.portable.filters import gaussian_blur
 from warpsplat.scene import FloatArray
@@ -53,7 +53,7 @@ def test_edges_are_where_objects_end() -> None:
 
 
 def test_what_is_cut_out_has_its_own_colours() -> None:
-    found = cut_out(photograph(0), everywhere=True)
+    found = without_ground(photograph(0), everywhere=True)
     edge = (found[..., 3] > 0.2) & (found[..., 3] < 1)
     straight = found[edge][:, :3] / found[edge][:, 3:]
     assert edge.any()
