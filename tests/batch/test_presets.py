@@ -16,7 +16,7 @@ from warpsplat.fit.settings import make_settings
 from warpsplat.scene import Basis, Kind
 
 STYLES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
-MACHINES = ["embroidery", "laser-cut", "laser-engrave", "plotter", "vinyl"]
+MACHINES = ["embroidery", "laser-cut", "laser-engrave", "plotter", "stencil", "vinyl"]
 
 
 def test_those_that_there_are() -> None:

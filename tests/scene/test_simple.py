@@ -158,3 +158,13 @@ def test_the_rings_of_a_shape_run_around_its_paint() -> None:
     assert [area(polygon(ring)) > 0 for ring in made] == [True, False]
     assert scene.kind[0] == Kind.FILL
     assert scene.basis[0] == Basis.CUBIC
+
+
+def test_fills_of_one_colour_become_one() -> None:
+    """Beside each other, and over another one."""
+    left, right = 'd="M10 10h20v40h-20z"', 'd="M30 10h20v40h-20z"'
+    made = cut_out(scene_of(left, 'd="M2 2h9v5h-9z" fill="red"', right), 16)
+    assert len(made) == 2
+    corners = [sorted(map(tuple, contour[::3].round(3).tolist())) for contour, _ in made.contours_of(1)]
+    assert {(10, 10), (50, 10), (50, 50), (10, 50)} <= set(corners[0])
+    assert len(corners) == 1

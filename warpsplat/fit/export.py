@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.bridges import bridged
 from warpsplat.scene.connected import separated
 from warpsplat.scene.cutout import cut_out
 from warpsplat.scene.simple import simple
@@ -33,9 +35,11 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
 
 def for_machines(scene: Scene, settings: Settings, per_pixel: float) -> Scene:
     """Return a scene with contours that machines accept, as far as the settings ask for them."""
+    bridge = functools.partial(bridged, width=float(settings.bridges or 0))
     changes = (
         (simple, settings.simple),
         (cut_out, settings.stack == "cutout"),
+        (bridge, settings.bridges),
         (separated, settings.separate),
     )
     for change, is_wanted in changes:

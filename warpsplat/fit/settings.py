@@ -364,6 +364,14 @@ class Settings:
         "Whether shapes lie on one another, or each is cut where others cover it; cutout makes all opaque.",
         refine=True,
     )
+    bridges: str = option(
+        "",
+        "For stencils: bridges of a width, in pixels or such as 2mm, that hold what is within an outline.",
+        metavar="N",
+        parse=str,
+        subjects=("drawing",),
+        elsewhere="ignored",
+    )
     symbols: bool = option(
         False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
@@ -595,14 +603,15 @@ def make_settings(quality: Quality = DEFAULT_QUALITY, **options: Any) -> Setting
     settings = replace(preset, **{**given, "rates": preset.rates})
     if settings.renderer != "exact":
         load_renderer(settings.renderer).check(settings)
-    if settings.sized_by or settings.width:
+    if settings.sized_by or settings.width or settings.bridges:
         from warpsplat.svg.page import checked_unit, length_of, sheet_for  # brings what writes files
 
         checked_unit(settings.units)
         if settings.size or settings.page:
             sheet_for(settings.size, settings.page, settings.units, 1, 1)
-        if settings.width:
-            length_of(settings.width)
+        for name, length in (("width", settings.width), ("bridges", settings.bridges)):
+            if length:
+                length_of(length, name)
     return settings
 
 

@@ -68,15 +68,27 @@ def paper_for(image: PreparedImage, settings: Settings) -> Paper:
     return Paper(settings, image.size, resolution, where_from)
 
 
-def with_width_in_pixels(image: PreparedImage) -> PreparedImage:
-    """Return an image whose settings' width of strokes, if any, is in pixels as it is processed."""
+def with_pixels(image: PreparedImage) -> PreparedImage:
+    """Return an image whose settings have the width of strokes, and that of bridges, in pixels.
+
+    Strokes are made in the pixels that are processed, bridges in those of the file.
+    """
+    settings, processed = image.problem.settings, image.problem.size[0] / image.size[0]
+    width, bridges = (_pixels(image, name) for name in ("width", "bridges"))
+    settings = replace(settings, width=width and f"{float(width) * processed:.9g}", bridges=bridges)
+    return replace(image, problem=replace(image.problem, settings=settings))
+
+
+def _pixels(image: PreparedImage, name: str) -> str:
+    """Return a length among the settings in pixels of the image, empty if there is none."""
     settings = image.problem.settings
-    if not settings.width:
-        return image
-    width, unit = length_of(settings.width)
-    width *= MILLIMETRES[unit] * paper_for(image, settings).sheet.scale(*image.size) if unit else 1
-    pixels = width * image.problem.size[0] / image.size[0]
-    return replace(image, problem=replace(image.problem, settings=replace(settings, width=f"{pixels:.9g}")))
+    text = getattr(settings, name)
+    if not text:
+        return ""
+    length, unit = length_of(text, name)
+    if unit:
+        length *= MILLIMETRES[unit] * paper_for(image, settings).sheet.scale(*image.size)
+    return f"{length:.9g}"
 
 
 def export_within(

@@ -67,5 +67,6 @@ class Options(RefineOptions, total=False):
     units: str | None
     dpi: float | None
     width: str | None
+    bridges: str | None
     symbols: bool | None
     strokes: bool | None

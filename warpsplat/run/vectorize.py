@@ -13,7 +13,6 @@ from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
-from warpsplat.fit.export import finished
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings, solid_color
@@ -24,7 +23,7 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
-from warpsplat.run.paper import export_within, paper_for, with_width_in_pixels
+from warpsplat.run.paper import export_within, paper_for, with_pixels
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
@@ -33,6 +32,7 @@ from warpsplat.run.tracking import before_clearing, failed, recorded, report_end
 from warpsplat.run.typed import Options
 from warpsplat.scene import Scene
 from warpsplat.svg.numbers import hex_colors
+from warpsplat.svg.write import on_background
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -130,7 +130,7 @@ def make_result(
     """
     begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
     checkpoint = run.checkpoint
-    image = with_width_in_pixels(image)
+    image = with_pixels(image)
     problem, reduction = image.problem, image.reduction
     target, settings = problem.target, problem.settings
     run = timed(recorded(run, history), settings, target)
@@ -162,14 +162,15 @@ def make_result(
         # A file that was cut short must not pass for a finished one.
         metadata = STOPPED if made.interrupted else problem.metadata
         paper = paper_for(image, settings)
-        svg, scene = export_within(made.scene, settings, made.per_pixel, metadata, paper)
-        file, notes = paper(svg), image.notes
-        if (
-            strategy.traces and problem.removes_background
-        ):  # only from the file, so that it is measured on its background
-            notes += (removal_note(scene, settings),)
-            scene = replace(scene, canvas=replace(scene.canvas, background=solid_color(settings.background)))
-            file = paper(finished(scene, settings, made.per_pixel, metadata))
+        shown, notes, background = made.scene, image.notes, made.scene.canvas.background
+        is_removed = strategy.traces and problem.removes_background
+        if is_removed:
+            notes += (removal_note(shown, settings),)
+            shown = replace(shown, canvas=replace(shown.canvas, background=solid_color(settings.background)))
+        svg, scene = export_within(shown, settings, made.per_pixel, metadata, paper)
+        file = paper(svg)
+        if is_removed and background is not None:  # figures are those on it
+            svg = on_background(svg, background, shown.canvas.background)
         if write:
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)

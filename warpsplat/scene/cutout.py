@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene.attributes import Basis, Kind, Rule
+from warpsplat.scene.attributes import Basis, Kind, Paint, Rule
 from warpsplat.scene.scene import IndexArray, Scene
 from warpsplat.scene.simple import (
     LEAST,
@@ -28,20 +28,43 @@ GROWN = 0.02
 def cut_out(scene: Scene, per_pixel: float) -> Scene:
     """Return a scene that looks the same, in which no fill lies under an opaque one in front of it.
 
-    The background becomes a shape. Strokes, and fills with one, stay as they are and hide nothing. Contours
-    are rounded as by ``simple``.
+    Fills of one opaque colour become one, so that no line is left between them, and the background a fill.
+    Strokes, and fills with one, stay as they are and hide nothing. Contours are rounded as by ``simple``.
     """
     scene = _with_background(scene)
-    least, made = LEAST * per_pixel * per_pixel, {}
+    least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
     above: list[Floats] = []
+    is_solid = (scene.paint == Paint.FLAT) & (scene.opacities >= 1)
+    of_color: dict[bytes, int] = {}
     for shape in reversed(free_fills(scene)):
         painted = PAINTED[Rule(scene.rule[shape])]
         rings = bounding(simple_rings(rings_of(scene, shape, per_pixel), painted, least), [], painted, least)
         near, far = _near(above, rings)
-        made[shape] = _combined(rings, [reversed_ring(ring) for ring in near], -GROWN, least)
+        made[shape] = difference(rings, near, least)
         if scene.opacities[shape] >= 1:
-            above = [*far, *_combined(near, rings, GROWN, least)]
+            above = [*far, *union(near, rings, least)]
+        if is_solid[shape]:
+            front = of_color.setdefault(scene.colors[shape].tobytes(), shape)
+            if front != shape:
+                near, far = _near(made[front], made[shape])
+                made[front], made[shape] = [*far, *union(near, made[shape], least)], []
     return with_rings(scene, made, per_pixel)
+
+
+def union(rings: list[Floats], others: list[Floats], least: float) -> list[Floats]:
+    """Return the rings around what either of two shapes covers; arguments as for ``difference``."""
+    return _combined(rings, others, GROWN, least)
+
+
+def difference(rings: list[Floats], others: list[Floats], least: float) -> list[Floats]:
+    """Return the rings around what one shape covers and another does not.
+
+    Args:
+        rings: Of the first shape, simple ones that run around it (``simple.bounding``), in units.
+        others: Of the second one.
+        least: Area of rings that are left out [units²].
+    """
+    return _combined(rings, [reversed_ring(ring) for ring in others], -GROWN, least)
 
 
 def _near(rings: list[Floats], others: list[Floats]) -> tuple[list[Floats], list[Floats]]:
@@ -75,9 +98,9 @@ def _with_background(scene: Scene) -> Scene:
 
 
 def _combined(rings: list[Floats], others: list[Floats], grown: float, least: float) -> list[Floats]:
-    """Return the union of two shapes; of one and another that runs the other way round, the difference.
+    """Return the rings around what is to the right, on a screen, of rings of either kind.
 
-    ``grown``: to the left, on a screen, of the others by how much, while crossings are looked for.
+    ``grown``: how far the others are moved to their left while crossings are looked for.
     """
     fixed = [np.concatenate([ring, ring], axis=2) for ring in rings]
     moved = [np.concatenate([ring, _grown(ring, grown)], axis=2) for ring in others]

@@ -107,7 +107,7 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     return Sheet(sides[0], sides[1], unit=unit)
 
 
-def length_of(text: str) -> tuple[float, str]:
+def length_of(text: str, option: str) -> tuple[float, str]:
     """Return a length such as ``0.3mm`` as a number and its unit, empty if there is none.
 
     Raises:
@@ -115,7 +115,7 @@ def length_of(text: str) -> tuple[float, str]:
     """
     found = LENGTH.fullmatch(text.strip())
     if not found or not float(found[1]):
-        raise UsageError(f"width must be pixels, such as 2, or a length such as 0.3mm, not {shown(text)}")
+        raise UsageError(f"{option} must be pixels, such as 2, or a length such as 0.3mm, not {shown(text)}")
     return float(found[1]), (found[2] or "").lower()
 
 

@@ -13,7 +13,19 @@ import numpy.typing as npt
 
 from warpsplat.errors import UsageError
 from warpsplat.portable.elementary import power_of_ten
-from warpsplat.scene import ATTRIBUTES, NO_DASHES, Basis, Cap, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene import (
+    ATTRIBUTES,
+    NO_DASHES,
+    Basis,
+    Cap,
+    FloatArray,
+    Join,
+    Kind,
+    Paint,
+    Picture,
+    Rule,
+    Scene,
+)
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 from warpsplat.svg.data import held_points, path_data, units
@@ -281,10 +293,7 @@ def write_svg(
     scene = in_parts(scene)
     canvas = scene.canvas
     width, height = (number(x * per_pixel, 3) for x in (canvas.width, canvas.height))
-    behind = ""
-    if background and canvas.background is not None:
-        paint = f' fill="{hex_colors(canvas.background[None])[0]}"'.replace(BLACK_FILL, "")
-        behind = f'<rect width="{width}" height="{height}"{paint}/>'
+    behind = _behind(width, height, canvas.background) if background and canvas.background is not None else ""
     scene, outlines, uses = with_symbols(scene, per_pixel) if symbols else (scene, "", {})
     elements, ramps = gradients(scene, per_pixel)
     defs = f"<defs>{''.join(elements)}{outlines}</defs>" if elements or outlines else ""
@@ -295,6 +304,22 @@ def write_svg(
     head = head_of(canvas.width, canvas.height, f"0 0 {width} {height}")
     mark = f"{MARK}{' ' if metadata else ''}{metadata}-->"
     return f"{head}{mark}\n{titled(title)}{defs}{behind}{shapes}</svg>\n"
+
+
+def _behind(width: str, height: str, color: FloatArray) -> str:
+    """Return a background of a colour, sRGB in [0, 1], shape (3,)."""
+    paint = f' fill="{hex_colors(color[None])[0]}"'.replace(BLACK_FILL, "")
+    return f'<rect width="{width}" height="{height}"{paint}/>'
+
+
+def on_background(text: str, color: FloatArray, own: FloatArray | None) -> str:
+    """Return a file written here on a background, sRGB in [0, 1], shape (3,), instead of its ``own``."""
+    text = _plain(text)
+    found = own_head(text)
+    head, rest = text[: found.end()], text[found.end() :]
+    if own is not None:
+        rest = rest.replace(_behind(found[3], found[4], own), "", 1)
+    return head + _behind(found[3], found[4], color) + rest
 
 
 def _check_finite(scene: Scene) -> None:

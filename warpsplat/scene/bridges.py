@@ -1,0 +1,68 @@
+"""Stencils: bridges from islands, which would fall out, to what surrounds them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpsplat.scene.attributes import Rule
+from warpsplat.scene.connected import parts_of
+from warpsplat.scene.cutout import difference
+from warpsplat.scene.scene import Scene
+from warpsplat.scene.simple import (
+    LEAST,
+    PAINTED,
+    Floats,
+    bounding,
+    free_fills,
+    polygon,
+    rings_of,
+    simple_rings,
+    with_rings,
+)
+
+
+def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
+    """Return a scene with bridges over the fills from each hole to what is around the part that it is in.
+
+    Each hole gets one where the way is shortest and one, the shortest again, to the other side. Contours are
+    rounded as by ``simple``.
+
+    Args:
+        scene: What to cut out.
+        per_pixel: As for ``simple``.
+        width: Of a bridge [px].
+    """
+    least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
+    for shape in free_fills(scene):
+        painted = PAINTED[Rule(scene.rule[shape])]
+        rings = bounding(simple_rings(rings_of(scene, shape, per_pixel), painted, least), [], painted, least)
+        made[shape] = []
+        for outer, *holes in parts_of(rings):
+            left = [outer, *holes]
+            for hole in holes:
+                for bridge in _bridges(polygon(hole), polygon(outer), width * per_pixel):
+                    left = difference(left, [bridge], least)
+            made[shape] += left
+    return with_rings(scene, made, per_pixel)
+
+
+def _bridges(hole: Floats, outer: Floats, width: float) -> list[Floats]:
+    """Return two rectangles from a hole to the outer ring around it, as rings of cubics."""
+    steps = outer[None] - hole[:, None]
+    lengths = np.hypot(steps[..., 0], steps[..., 1])
+    first = np.unravel_index(lengths.argmin(), lengths.shape)
+    is_behind = (steps * steps[first]).sum(axis=2) < 0
+    second = np.unravel_index(np.where(is_behind, lengths, np.inf).argmin(), lengths.shape)
+    return [_rectangle(hole[i], outer[j], width) for i, j in {first, second}]
+
+
+def _rectangle(start: Floats, end: Floats, width: float) -> Floats:
+    """Return a rectangle of a width from one point to beyond another, which runs clockwise on a screen."""
+    along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+    across = 0.5 * width * np.array([-along[1], along[0]])
+    start, end = start - 0.5 * width * along, end + 0.5 * width * along
+    corners = np.round([start - across, end - across, end + across, start + across])
+    following = np.roll(corners, -1, axis=0)
+    return np.stack(
+        [corners, (2 * corners + following) / 3, (corners + 2 * following) / 3, following], axis=1
+    )
