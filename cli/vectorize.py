@@ -39,8 +39,8 @@ from warpsplat.run.options import settings_from, with_preset
     "--preset",
     metavar="NAME",
     help="Options of a style (brush, ink, low-poly, placeholder, poster, stained-glass), for a machine"
-    " (embroidery, laser-cut, laser-engrave, plotter, vinyl), or of a YAML file; options beside it count"
-    " more.",
+    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside it"
+    " count more.",
 )
 @quality_options(several=True)
 @importance_option

@@ -24,7 +24,7 @@ from warpsplat.scene.simple import (
 def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
     """Return a scene with bridges over the fills from each hole to what is around the part that it is in.
 
-    Each hole gets one where the way is shortest and one, the shortest again, to the other side. Contours are
+    Each hole gets one where the way is shortest, and a short one to the other side. Contours are
     rounded as by ``simple``.
 
     Args:
@@ -51,9 +51,10 @@ def _bridges(hole: Floats, outer: Floats, width: float) -> list[Floats]:
     steps = outer[None] - hole[:, None]
     lengths = np.hypot(steps[..., 0], steps[..., 1])
     first = np.unravel_index(lengths.argmin(), lengths.shape)
-    is_behind = (steps * steps[first]).sum(axis=2) < 0
-    second = np.unravel_index(np.where(is_behind, lengths, np.inf).argmin(), lengths.shape)
-    return [_rectangle(hole[i], outer[j], width) for i, j in {first, second}]
+    # The farther round it is, the longer the second one may be.
+    opposite = -(steps * steps[first]).sum(axis=2) / np.maximum(lengths * lengths[first], 1e-9)
+    second = np.unravel_index((opposite / np.maximum(lengths, 1e-9)).argmax(), lengths.shape)
+    return [_rectangle(hole[i], outer[j], width) for i, j in (first, second)]
 
 
 def _rectangle(start: Floats, end: Floats, width: float) -> Floats:
