@@ -26,7 +26,8 @@ SPREAD = 0.7
 STENCIL = """<svg xmlns="http://www.w3.org/2000/svg" width="1680" height="640" viewBox="0 0 210 80">
 <rect width="210" height="80" fill="#fff"/><g fill-rule="evenodd">
 <path d="M45 8a32 32 0 1 0 .1 0zM45 24a16 16 0 1 1 -.1 0z"/>
-<path d="M92 8h34c26 0 24 26 12 31 16 5 16 33-10 33H92zM108 20v12h16c8 0 8-12 0-12zM108 44v15h18c9 0 9-15 0-15z"
+<path d="M92 8h34c26 0 24 26 12 31 16 5 16 33-10 33H92zM108 20v12h16c8 0 8-12 0-12zM108 44v15h18c9 0 9-15
+ 0-15z"
 />
 <path d="M180 10l28 62h-16l-4-10h-16l-4 10h-16zM180 34l-6 15h12z"/></g></svg>"""
 

@@ -68,13 +68,14 @@ def test_rounding_does_not_add_up(basis: Basis) -> None:
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("per_pixel", GRIDS)
 def test_numbers_of_a_file_are_short(kind: Kind, per_pixel: float) -> None:
-    """Coordinates are whole, opacities have two decimals and widths one, and paths are not closed."""
+    """Coordinates are whole, opacities have two decimals and widths one; fills are closed."""
     scene = mixed_scene(41, 37)
     text = write_svg(scene.take(np.flatnonzero(scene.kind == kind)), per_pixel=per_pixel)
     paths = re.findall(r' d="([^"]*)"', text)
     assert len(paths) == (scene.kind == kind).sum()
     for data in paths:
-        assert re.fullmatch(r"[Mm]-?\d+([ -]\d+)+([cqstlhvCQSTLHV](-?\d+[ ]?)+)*", data), data
+        assert re.fullmatch(r"[Mm]-?\d+(?:[ -]\d+)+(?:[cqstlhvCQSTLHV]-?\d+(?:[ -]\d+)*)*z?", data), data
+        assert data.endswith("z") == (kind == Kind.FILL)
         assert "  " not in data and " -" not in data
     assert all(len(x) <= 3 for x in re.findall(r'-opacity="([^"]*)"', text))
     assert all(re.fullmatch(r"\d*(\.\d)?", x) for x in re.findall(r'stroke-width="([^"]*)"', text))

@@ -53,7 +53,9 @@ def _noise_of_grey(grey: Floats) -> float:
     bend[1:-1] = np.maximum(bend[1:-1], np.abs(np.diff(grey, n=2, axis=0)))
     edge = step > EDGE
     ring = dilated(edge, 13) & ~dilated(edge, 5)
-    beside = ring if ring.sum() >= 64 else np.ones_like(ring)
+    beside = ring if ring.sum() >= 64 else ~edge
+    if not beside.any():  # as in a checkerboard
+        return 0.0
     some = [np.sort(change[beside]) for change in (step, bend)]
     noise, bent = (float(values[int(NOISE_QUANTILE * (len(values) - 1))]) for values in some)
     # Steps that are all alike are a gradient, but for a level of rounding; those of noise differ as much.
