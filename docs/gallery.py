@@ -24,7 +24,7 @@ from warpsplat.fit.settings import Subject
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "gallery"
-SUBJECTS = tuple(name for name in get_args(Subject) if name != "auto")
+SUBJECTS = tuple(name for name in get_args(Subject) if name not in {"auto", "silhouette"})
 
 DECIDING = ("drawing", "fit", "forms", "kernels", "portable", "rendering", "run", "scene", "search", "svg")
 """Parts of the package whose code decides what a file becomes."""

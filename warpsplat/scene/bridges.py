@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Rule
 from warpsplat.scene.connected import parts_of
 from warpsplat.scene.cutout import difference
@@ -49,7 +50,7 @@ def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
 def _bridges(hole: Floats, outer: Floats, width: float) -> list[Floats]:
     """Return two rectangles from a hole to the outer ring around it, as rings of cubics."""
     steps = outer[None] - hole[:, None]
-    lengths = np.hypot(steps[..., 0], steps[..., 1])
+    lengths = elementary.hypot(steps[..., 0], steps[..., 1])
     first = np.unravel_index(lengths.argmin(), lengths.shape)
     # The farther round it is, the longer the second one may be.
     opposite = -(steps * steps[first]).sum(axis=2) / np.maximum(lengths * lengths[first], 1e-9)
@@ -59,7 +60,7 @@ def _bridges(hole: Floats, outer: Floats, width: float) -> list[Floats]:
 
 def _rectangle(start: Floats, end: Floats, width: float) -> Floats:
     """Return a rectangle of a width from one point to beyond another, which runs clockwise on a screen."""
-    along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+    along = (end - start) / max(float(elementary.hypot(*(end - start))), 1e-9)
     across = 0.5 * width * np.array([-along[1], along[0]])
     start, end = start - 0.5 * width * along, end + 0.5 * width * along
     corners = np.round([start - across, end - across, end + across, start + across])

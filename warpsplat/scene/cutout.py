@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Paint, Rule
 from warpsplat.scene.scene import IndexArray, Scene
 from warpsplat.scene.simple import (
@@ -118,13 +119,13 @@ def _grown(ring: Floats, distance: float) -> Floats:
     after, before = (_first_directions(steps) for steps in ends)
     side = after + np.roll(before, 1, axis=0)
     normal = np.stack([side[:, 1], -side[:, 0]], axis=1)
-    normal = distance * normal / np.maximum(np.hypot(*normal.T), 1e-9)[:, None]
+    normal = distance * normal / np.maximum(elementary.hypot(*normal.T), 1e-9)[:, None]
     following = np.roll(normal, -1, axis=0)
     return ring + np.stack([normal, normal, following, following], axis=1)
 
 
 def _first_directions(steps: Floats) -> Floats:
     """Return the direction of the first step that has one: (cubic, step, 2) -> (cubic, 2)."""
-    lengths = np.hypot(steps[..., 0], steps[..., 1])
+    lengths = elementary.hypot(steps[..., 0], steps[..., 1])
     rows, first = np.arange(len(steps)), (lengths > 0).argmax(axis=1)
     return np.asarray(steps[rows, first] / np.maximum(lengths[rows, first], 1e-9)[:, None])

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Rule
 from warpsplat.scene.geometry import beziers
 from warpsplat.scene.intersections import flattened, intersections, parts
@@ -232,7 +233,7 @@ def bounding(rings: list[Floats], new: list[Floats], painted: Painted, least: fl
             (turns(lines[j], 0.5 * (one + other)) for j in near if j != i), np.zeros(len(one), np.intp)
         )
         is_clockwise = area(line) > 0
-        length, inside = np.hypot(*(other - one).T), painted(around + (1 if is_clockwise else -1))
+        length, inside = elementary.hypot(*(other - one).T), painted(around + (1 if is_clockwise else -1))
         is_outer, is_inner = (
             float(length[side].sum()) for side in (inside & ~painted(around), painted(around) & ~inside)
         )
