@@ -154,7 +154,7 @@ def test_the_rings_of_a_shape_run_around_its_paint() -> None:
     scene = scene_of('d="M10 10V50H50V10zM20 20V40H40V20z" fill-rule="evenodd"')
     rings = rings_of(scene, 0, 16)
     painted = PAINTED[Rule.EVENODD]
-    made = bounding(simple_rings(rings, painted, 0), [], painted, 0)
+    made = bounding(simple_rings(rings, painted, 0), painted)
     assert [area(polygon(ring)) > 0 for ring in made] == [True, False]
     assert scene.kind[0] == Kind.FILL
     assert scene.basis[0] == Basis.CUBIC

@@ -23,7 +23,7 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
     """Return the SVG of ``scene``, with ``per_pixel`` units of its view box per pixel."""
     renderer = renderer_of(settings.renderer)
     return write_svg(
-        for_machines(renderer.to_paths(scene, settings), settings, per_pixel),
+        renderer.to_paths(scene, settings),
         per_pixel=per_pixel,
         metadata=metadata,
         opacity_scale=renderer.opacity_scale,
@@ -36,6 +36,8 @@ def export(scene: Scene, settings: Settings, per_pixel: float, metadata: str = "
 def for_machines(scene: Scene, settings: Settings, per_pixel: float) -> Scene:
     """Return a scene with contours that machines accept, as far as the settings ask for them."""
     bridge = functools.partial(bridged, width=float(settings.bridges or 0))
+    if settings.bridges:  # a stencil has no background
+        scene = replace(scene, canvas=replace(scene.canvas, background=None))
     changes = (
         (simple, settings.simple),
         (cut_out, settings.stack == "cutout"),

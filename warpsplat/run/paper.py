@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from warpsplat.fit.export import finished
+from warpsplat.fit.export import finished, for_machines
 from warpsplat.fit.settings import Settings
 from warpsplat.run.prepare import PreparedImage
 from warpsplat.scene import Scene
@@ -99,7 +99,7 @@ def export_within(
     """
 
     def made() -> tuple[str, int]:
-        text = finished(scene, settings, per_pixel, metadata)
+        text = finished(for_machines(scene, settings, per_pixel), settings, per_pixel, metadata)
         return text, len(paper(text).encode())
 
     svg, size = made()

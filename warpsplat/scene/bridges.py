@@ -13,11 +13,10 @@ from warpsplat.scene.simple import (
     LEAST,
     PAINTED,
     Floats,
-    bounding,
     free_fills,
+    merged,
     polygon,
     rings_of,
-    simple_rings,
     with_rings,
 )
 
@@ -36,7 +35,7 @@ def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
     least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
     for shape in free_fills(scene):
         painted = PAINTED[Rule(scene.rule[shape])]
-        rings = bounding(simple_rings(rings_of(scene, shape, per_pixel), painted, least), [], painted, least)
+        rings = merged(rings_of(scene, shape, per_pixel), painted, least)
         made[shape] = []
         for outer, *holes in parts_of(rings):
             left = [outer, *holes]

@@ -11,11 +11,10 @@ from warpsplat.scene.simple import (
     PAINTED,
     Floats,
     area,
-    bounding,
     free_fills,
+    merged,
     polygon,
     rings_of,
-    simple_rings,
     turns,
     with_rings,
 )
@@ -35,8 +34,8 @@ def separated(scene: Scene, per_pixel: float) -> Scene:
             rows.append(shape)
             continue
         painted = PAINTED[Rule(scene.rule[shape])]
-        rings = simple_rings(rings_of(scene, shape, per_pixel), painted, LEAST * per_pixel * per_pixel)
-        for part in parts_of(bounding(rings, [], painted, 0.0)):
+        rings = merged(rings_of(scene, shape, per_pixel), painted, LEAST * per_pixel * per_pixel)
+        for part in parts_of(rings):
             made[len(rows)] = part
             rows.append(shape)
     return with_rings(scene.take(np.array(rows, np.intp)), made, per_pixel)

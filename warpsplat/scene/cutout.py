@@ -5,41 +5,44 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Paint, Rule
-from warpsplat.scene.scene import IndexArray, Scene
+from warpsplat.scene.scene import Scene
 from warpsplat.scene.simple import (
+    GROWN,
     LEAST,
     PAINTED,
     Floats,
-    bounding,
+    Painted,
     free_fills,
+    joined,
+    merged,
+    moved_left,
     reversed_ring,
     rings_of,
-    simple_rings,
     with_rings,
 )
-
-GROWN = 0.02
-"""By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
 
 
 def cut_out(scene: Scene, per_pixel: float) -> Scene:
     """Return a scene that looks the same, in which no fill lies under an opaque one in front of it.
 
     Fills of one opaque colour become one, so that no line is left between them, and the background a fill.
-    Strokes, and fills with one, stay as they are and hide nothing. Contours are rounded as by ``simple``.
+    What is beyond the canvas goes. Strokes, and fills with one, stay as they are and hide nothing. Contours
+    are rounded as by ``simple``.
     """
     scene = _with_background(scene)
     least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
     above: list[Floats] = []
+    size = per_pixel * np.array([scene.canvas.width, scene.canvas.height])
+    page = [_rectangle(*size.tolist())]
     is_solid = (scene.paint == Paint.FLAT) & (scene.opacities >= 1)
     of_color: dict[bytes, int] = {}
     for shape in reversed(free_fills(scene)):
         painted = PAINTED[Rule(scene.rule[shape])]
-        rings = bounding(simple_rings(rings_of(scene, shape, per_pixel), painted, least), [], painted, least)
+        rings = merged(rings_of(scene, shape, per_pixel), painted, least)
+        if any((ring.min(axis=(0, 1)) < 0).any() or (ring.max(axis=(0, 1)) > size).any() for ring in rings):
+            rings = intersection(rings, page, least)
         near, far = _near(above, rings)
         made[shape] = difference(rings, near, least)
         if scene.opacities[shape] >= 1:
@@ -54,7 +57,12 @@ def cut_out(scene: Scene, per_pixel: float) -> Scene:
 
 def union(rings: list[Floats], others: list[Floats], least: float) -> list[Floats]:
     """Return the rings around what either of two shapes covers; arguments as for ``difference``."""
-    return _combined(rings, others, GROWN, least)
+    return _combined(rings, others, GROWN, lambda turns: turns > 0, least)
+
+
+def intersection(rings: list[Floats], others: list[Floats], least: float) -> list[Floats]:
+    """Return the rings around what both of two shapes cover; arguments as for ``difference``."""
+    return _combined(rings, others, GROWN, lambda turns: turns > 1, least)
 
 
 def difference(rings: list[Floats], others: list[Floats], least: float) -> list[Floats]:
@@ -65,7 +73,7 @@ def difference(rings: list[Floats], others: list[Floats], least: float) -> list[
         others: Of the second one.
         least: Area of rings that are left out [units²].
     """
-    return _combined(rings, [reversed_ring(ring) for ring in others], -GROWN, least)
+    return _combined(rings, [reversed_ring(ring) for ring in others], -GROWN, lambda turns: turns > 0, least)
 
 
 def _near(rings: list[Floats], others: list[Floats]) -> tuple[list[Floats], list[Floats]]:
@@ -87,45 +95,29 @@ def _with_background(scene: Scene) -> Scene:
     canvas = scene.canvas
     if canvas.background is None:
         return scene
-    corners = np.array([(0, 0), (canvas.width, 0), (canvas.width, canvas.height), (0, canvas.height)])
-    thirds = np.arange(3)[:, None] / 3
-    sides = corners[:, None] + thirds * (np.roll(corners, -1, axis=0) - corners)[:, None]
     bare = replace(canvas, background=None)
-    behind = Scene.uniform(Kind.FILL, bare, sides.reshape(1, -1, 2).astype(np.float32), Basis.CUBIC)
+    points = _rectangle(canvas.width, canvas.height)[:, :3].reshape(1, -1, 2).astype(np.float32)
+    behind = Scene.uniform(Kind.FILL, bare, points, Basis.CUBIC)
     behind = replace(
         behind, colors=canvas.background[None].astype(np.float32), opacities=np.ones(1, np.float32)
     )
     return behind.append(replace(scene, canvas=bare))
 
 
-def _combined(rings: list[Floats], others: list[Floats], grown: float, least: float) -> list[Floats]:
-    """Return the rings around what is to the right, on a screen, of rings of either kind.
+def _rectangle(width: float, height: float) -> Floats:
+    """Return a rectangle with a corner at 0 as a ring of cubics, shape (4, 4, 2)."""
+    corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], np.float64)
+    steps = np.roll(corners, -1, axis=0) - corners
+    return corners[:, None] + np.arange(4)[:, None] / 3 * steps[:, None]
 
-    ``grown``: how far the others are moved to their left while crossings are looked for.
+
+def _combined(
+    rings: list[Floats], others: list[Floats], grown: float, painted: Painted, least: float
+) -> list[Floats]:
+    """Return the rings around what two kinds of rings wind around as often as is ``painted``.
+
+    ``grown``: how far the others are moved to their left, on a screen, while crossings are looked for.
     """
     fixed = [np.concatenate([ring, ring], axis=2) for ring in rings]
-    moved = [np.concatenate([ring, _grown(ring, grown)], axis=2) for ring in others]
-    made = simple_rings([*fixed, *moved], _is_filled, least)
-    return [ring[..., :2] for ring in bounding(made, [], _is_filled, least)]
-
-
-def _is_filled(turns: IndexArray) -> npt.NDArray[np.bool_]:
-    return turns > 0
-
-
-def _grown(ring: Floats, distance: float) -> Floats:
-    """Return a ring of cubics with its nodes moved to the left on a screen, and the handles with them."""
-    ends = [ring[:, 1:] - ring[:, :1], (ring[:, 3:] - ring[:, 2::-1])]
-    after, before = (_first_directions(steps) for steps in ends)
-    side = after + np.roll(before, 1, axis=0)
-    normal = np.stack([side[:, 1], -side[:, 0]], axis=1)
-    normal = distance * normal / np.maximum(elementary.hypot(*normal.T), 1e-9)[:, None]
-    following = np.roll(normal, -1, axis=0)
-    return ring + np.stack([normal, normal, following, following], axis=1)
-
-
-def _first_directions(steps: Floats) -> Floats:
-    """Return the direction of the first step that has one: (cubic, step, 2) -> (cubic, 2)."""
-    lengths = elementary.hypot(steps[..., 0], steps[..., 1])
-    rows, first = np.arange(len(steps)), (lengths > 0).argmax(axis=1)
-    return np.asarray(steps[rows, first] / np.maximum(lengths[rows, first], 1e-9)[:, None])
+    moved = [np.concatenate([ring, moved_left(ring, grown)], axis=2) for ring in others]
+    return joined([*fixed, *moved], painted, least)

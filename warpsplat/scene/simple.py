@@ -7,7 +7,7 @@ on both sides, or on neither, are left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Rule
 from warpsplat.scene.geometry import beziers
 from warpsplat.scene.intersections import flattened, intersections, parts
-from warpsplat.scene.scene import FloatArray, IndexArray, Scene, starts_of
+from warpsplat.scene.scene import FloatArray, IndexArray, Scene, ranges, starts_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -30,6 +30,9 @@ LEAST = 0.1
 PIECES, SAMPLES = 8, 9
 """Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
 
+
+GROWN = 0.02
+"""By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
 
 Painted = Callable[[IndexArray], npt.NDArray[np.bool_]]
 """Whether there is paint, by how often contours wind around a place."""
@@ -107,23 +110,47 @@ def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Fl
     a ring on a screen: outer ones run clockwise.
 
     Args:
-        rings: Of one shape, each of shape (cubic, 4, 2), in units; or (cubic, 4, 4), where the last two are
-            other coordinates, near the first two, by which is told what crosses.
+        rings: Of one shape, each of shape (cubic, 4, 2), in units.
         painted: Where there is paint.
         least: Area [units²].
     """
     for _ in range(ROUNDS):
-        cut = _uncrossed(rings)
-        if cut is None:
+        kept, new = uncrossed(rings)
+        if not new:
             break
-        rings = [ring[..., :2] for ring in bounding(*cut, painted, least)]
+        rings = [*kept, *bounding(large(new, least), painted, kept)]
     return rings
 
 
-def _uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]] | None:
-    """Return the rings without crossings and repeated nodes, and what others become; None: there are none."""
+def merged(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
+    """Return simple rings that run around the paint of a shape, where rings share edges, too.
+
+    Arguments as for ``simple_rings``.
+    """
+    grown = (moved_left(ring, GROWN * (1 + i * 0.618 % 1)) for i, ring in enumerate(rings))
+    return joined([np.concatenate(both, axis=2) for both in zip(rings, grown, strict=True)], painted, least)
+
+
+def joined(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
+    """Return simple rings that run around what is painted; ``rings``: (cubic, 4, 4), as for ``uncrossed``."""
+    kept, new = uncrossed(rings)
+    made = [ring[..., :2] for ring in bounding([*kept, *large(new, least)], painted)]
+    return simple_rings(made, PAINTED[Rule.NONZERO], least)
+
+
+def large(rings: list[Floats], least: float) -> list[Floats]:
+    """Return the rings with an area of at least ``least`` [units²]."""
+    return [ring for ring in rings if abs(area(polygon(ring[..., :2]))) >= least]
+
+
+def uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]]:
+    """Return the rings without crossings and repeated nodes, and what becomes of the others.
+
+    ``rings``: shape (cubic, 4, 2); or (cubic, 4, 4), where the last two are coordinates near the first two,
+    by which is told what crosses.
+    """
     if not rings:
-        return None
+        return [], []
     cubics, counts = np.concatenate(rings), np.array([len(ring) for ring in rings])
     first, owner = starts_of(counts), np.repeat(np.arange(len(rings)), counts)
     following = np.arange(1, len(cubics) + 1)
@@ -132,7 +159,7 @@ def _uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]] | None:
     crossed = np.isin(np.arange(len(rings)), owner[pairs])
     touching = np.array([len(set(map(tuple, ring[:, 0, :2].tolist()))) < len(ring) for ring in rings])
     if not (crossed | touching).any():
-        return None
+        return rings, []
     new = [ring for ring, is_new in zip(rings, touching & ~crossed, strict=True) if is_new]
     if len(pairs):
         new += _joined(cubics, following, owner, pairs, places)
@@ -217,29 +244,57 @@ def reversed_ring(ring: Floats) -> Floats:
     return ring[::-1, ::-1]
 
 
-def bounding(rings: list[Floats], new: list[Floats], painted: Painted, least: float) -> list[Floats]:
-    """Return the rings with paint on one side only, which run around it; of ``new`` ones, the large ones."""
-    is_small = [abs(area(polygon(ring[..., :2]))) < least for ring in new]
-    every = [*rings, *(ring for ring, is_left_out in zip(new, is_small, strict=True) if not is_left_out)]
-    lines = [polygon(ring[..., -2:]) for ring in every]
-    low, high = (np.array([extreme(points, axis=0) for points in lines]) for extreme in (np.min, np.max))
-    found = []
-    for i, (ring, line) in enumerate(zip(every, lines, strict=True)):
-        # Another ring may lie on a part of it: the places along it vote, by their lengths.
-        places = np.linspace(0, len(line), min(SAMPLES, len(line)), endpoint=False).astype(np.intp)
-        one, other = line[places], np.roll(line, -1, axis=0)[places]
-        near = np.flatnonzero(((low <= high[i]) & (low[i] <= high)).all(axis=1)).tolist()
-        around = sum(
-            (turns(lines[j], 0.5 * (one + other)) for j in near if j != i), np.zeros(len(one), np.intp)
-        )
-        is_clockwise = area(line) > 0
-        length, inside = elementary.hypot(*(other - one).T), painted(around + (1 if is_clockwise else -1))
-        is_outer, is_inner = (
-            float(length[side].sum()) for side in (inside & ~painted(around), painted(around) & ~inside)
-        )
-        if 2 * max(is_outer, is_inner) > length.sum():
-            found.append(ring if is_clockwise == (is_outer > is_inner) else reversed_ring(ring))
-    return found
+def bounding(rings: list[Floats], painted: Painted, kept: Sequence[Floats] = ()) -> list[Floats]:
+    """Return the rings with paint on one side only, turned so that they run around it.
+
+    Args:
+        rings: That do not cross, as ``uncrossed`` takes them.
+        painted: Where there is paint.
+        kept: Rings beside them.
+    """
+    if not rings:
+        return []
+    lines = [polygon(ring[..., -2:]) for ring in (*rings, *kept)]
+    # Another ring may lie on a part of one: the places along it vote, by their lengths.
+    chosen = lines[: len(rings)]
+    places = [np.arange(0, len(line), -(-len(line) // SAMPLES)) for line in chosen]
+    owner = np.repeat(np.arange(len(rings)), [len(own) for own in places])
+    one = np.concatenate([line[own] for line, own in zip(chosen, places, strict=True)])
+    other = np.concatenate([np.roll(line, -1, axis=0)[own] for line, own in zip(chosen, places, strict=True)])
+    around = _turns_of_others(lines, 0.5 * (one + other), owner)
+    is_clockwise = np.array([area(line) > 0 for line in chosen])
+    inside = painted(around + np.where(is_clockwise[owner], 1, -1))
+    length, outside = elementary.hypot(*(other - one).T), painted(around)
+    outer, inner, total = (
+        np.bincount(owner, length * side, len(rings)) for side in (inside & ~outside, outside & ~inside, 1.0)
+    )
+    bounds = 2 * np.maximum(outer, inner) > total
+    runs_so = is_clockwise == (outer > inner)
+    return [ring if runs_so[i] else reversed_ring(ring) for i, ring in enumerate(rings) if bounds[i]]
+
+
+def _turns_of_others(lines: list[Floats], points: Floats, owner: IndexArray) -> IndexArray:
+    """Return how often polygons but its owner wind around each point, positive from x towards y."""
+    one, other = np.concatenate(lines), np.concatenate([np.roll(line, -1, axis=0) for line in lines])
+    ring = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    low, high = np.minimum(one[:, 1], other[:, 1]), np.maximum(one[:, 1], other[:, 1])
+    # Only the lines in a point's row count.
+    count = 1 + int(np.sqrt(len(one)))
+    top, height = low.min(), max(float(high.max() - low.min()), 1e-9) / count
+    first, last, at = (
+        np.clip(((y - top) / height).astype(np.intp), 0, count - 1) for y in (low, high, points[:, 1])
+    )
+    rows, line = ranges(first, last - first + 1), np.repeat(np.arange(len(one)), last - first + 1)
+    order = np.argsort(rows, kind="stable")
+    begins = np.searchsorted(rows[order], np.arange(count + 1))
+    counts = begins[at + 1] - begins[at]
+    point, line = np.repeat(np.arange(len(points)), counts), line[order][ranges(begins[at], counts)]
+    others = ring[line] != owner[point]
+    point, line = point[others], line[others]
+    a, b = one[line] - points[point], other[line] - points[point]
+    side = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    up, down = (a[:, 1] <= 0) & (b[:, 1] > 0) & (side > 0), (a[:, 1] > 0) & (b[:, 1] <= 0) & (side < 0)
+    return np.bincount(point[up], minlength=len(points)) - np.bincount(point[down], minlength=len(points))
 
 
 def polygon(ring: Floats) -> Floats:
@@ -259,3 +314,21 @@ def turns(ring: Floats, points: Floats) -> IndexArray:
     up, down = (one[..., 1] <= 0) & (other[..., 1] > 0), (one[..., 1] > 0) & (other[..., 1] <= 0)
     side = one[..., 0] * other[..., 1] - other[..., 0] * one[..., 1]
     return np.asarray((up & (side > 0)).sum(axis=1) - (down & (side < 0)).sum(axis=1), np.intp)
+
+
+def moved_left(ring: Floats, distance: float) -> Floats:
+    """Return a ring of cubics with its nodes moved to the left on a screen, and the handles with them."""
+    ends = [ring[:, 1:] - ring[:, :1], (ring[:, 3:] - ring[:, 2::-1])]
+    after, before = (_first_directions(steps) for steps in ends)
+    side = after + np.roll(before, 1, axis=0)
+    normal = np.stack([side[:, 1], -side[:, 0]], axis=1)
+    normal = distance * normal / np.maximum(elementary.hypot(*normal.T), 1e-9)[:, None]
+    following = np.roll(normal, -1, axis=0)
+    return ring + np.stack([normal, normal, following, following], axis=1)
+
+
+def _first_directions(steps: Floats) -> Floats:
+    """Return the direction of the first step that has one: (cubic, step, 2) -> (cubic, 2)."""
+    lengths = elementary.hypot(steps[..., 0], steps[..., 1])
+    rows, first = np.arange(len(steps)), (lengths > 0).argmax(axis=1)
+    return np.asarray(steps[rows, first] / np.maximum(lengths[rows, first], 1e-9)[:, None])
