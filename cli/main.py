@@ -29,7 +29,7 @@ COMMANDS: dict[str, Command] = {
     "vectorize": Command("Turn an image into an SVG.", "warpsplat.cli.vectorize:command"),
     "refine": Command("Improve an SVG against an image.", "warpsplat.cli.refine:command"),
     "eval": Command("Measure any SVG against an image.", "warpsplat.cli.evaluate:command"),
-    "render": Command("Render an SVG to a PNG.", "warpsplat.cli.render:command"),
+    "render": Command("Render an SVG to a PNG, PDF, DXF or EPS.", "warpsplat.cli.render:command"),
     **declared("commands"),
 }
 """All commands: those of the core, then those of the extensions."""

@@ -361,7 +361,7 @@ class Settings:
     separate: bool = option(False, "A path for each connected part of a colour, with its holes.", refine=True)
     stack: Stack = option(
         "overlap",
-        "Whether shapes lie on one another, or each is cut where others cover it; cutout makes all opaque.",
+        "Whether shapes lie on one another, or each is cut where others cover it; photos are opaque then.",
         refine=True,
     )
     bridges: str = option(
@@ -478,6 +478,11 @@ class Settings:
         """Name of an option that gives the file a size on paper; empty: none."""
         options = (("size", self.size), ("page", self.page), ("dpi", self.dpi), ("units", self.units))
         return next((name for name, value in options if value), "")
+
+    @property
+    def reshapes(self) -> bool:
+        """Whether outlines become others for machines, after the fit."""
+        return self.simple or self.separate or self.stack == "cutout" or bool(self.bridges)
 
     @property
     def counting(self) -> list[str]:

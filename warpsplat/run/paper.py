@@ -46,7 +46,7 @@ class Paper:
         if settings.sized_by not in {"dpi", "units"} or settings.units == "px":
             return ()
         size = "x".join(self.sheet.lengths()) + f" {self.sheet.unit}"
-        x, y = (f"{each:.6g}" for each in self.resolution)
+        x, y = (f"{each:.5g}" for each in self.resolution)
         return (f"{size}: {x if x == y else f'{x} and {y}'} pixels an inch, {self.where_from}",)
 
     @property

@@ -159,6 +159,7 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     if judged:
         after, start = (loss_of_file(each, refined, problem, run.backend) for each in (svg, text))
         better = after < start
+    better = better or settings.reshapes  # cuts cost some decibels
     if perceptual and not better:
         before = score_svg(text, target)
     if view:
