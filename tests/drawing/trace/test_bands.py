@@ -76,6 +76,16 @@ def test_a_slope_is_no_noise_but_grain_is() -> None:
     assert noise_of(image) == 2
 
 
+def test_a_map_without_flat_areas_has_no_noise_but_a_noisy_one_has() -> None:
+    """Every pixel is beside an edge, and some of its steps are small."""
+    colors = np.array([(90, 30, 20), (100, 120, 30), (110, 150, 60)], np.float32)
+    image = np.full((32, 32, 4), 255, np.float32)
+    image[..., :3] = colors[np.random.default_rng(0).integers(0, 3, (32, 32))]
+    assert noise_of(image) < 1
+    image[..., :3] += np.round(np.random.default_rng(0).normal(0, 4, (32, 32, 1)))
+    assert noise_of(image) > 3
+
+
 def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:
     opacity = np.random.default_rng(0).normal(128, 6, (80, 80, 1)).astype(np.float32)
     assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white

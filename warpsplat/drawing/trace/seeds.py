@@ -19,6 +19,9 @@ NOISE_QUANTILE = 0.7  # of the steps beside edges, that measures the noise
 BEND_OF_NOISE, BEND_OF_ROUNDING = 1.7, 0.6
 """How much steps of noise differ over their size, and what rounding to levels adds to that [levels]."""
 
+EQUAL_NEIGHBOURS = 0.28
+"""Share of neighbours that are equal after rounding, times the noise: 1 / (2 sqrt(pi)) for normal noise."""
+
 ROUNDING = 1.0
 """How far pixels of one colour are off it, or one another, besides noise [levels]: more is seen."""
 
@@ -53,13 +56,17 @@ def _noise_of_grey(grey: Floats) -> float:
     bend[1:-1] = np.maximum(bend[1:-1], np.abs(np.diff(grey, n=2, axis=0)))
     edge = step > EDGE
     ring = dilated(edge, 13) & ~dilated(edge, 5)
-    beside = ring if ring.sum() >= 64 else ~edge
+    is_dense = ring.sum() < 64
+    beside = ~edge if is_dense else ring
     if not beside.any():  # as in a checkerboard
         return 0.0
     some = [np.sort(change[beside]) for change in (step, bend)]
     noise, bent = (float(values[int(NOISE_QUANTILE * (len(values) - 1))]) for values in some)
     # Steps that are all alike are a gradient, but for a level of rounding; those of noise differ as much.
-    return noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - BEND_OF_ROUNDING, 0.0)
+    noise = noise if bent > noise or bent == noise > 1 else max(bent / BEND_OF_NOISE - BEND_OF_ROUNDING, 0.0)
+    if is_dense and edge.any():  # steps of the drawing are in it: noise would make equal neighbours rare
+        noise = min(noise, EQUAL_NEIGHBOURS / max(float((np.diff(grey, axis=1) == 0).mean()), 1e-9))
+    return noise
 
 
 def find_seeds(image: Floats, noise: float) -> Ints:
