@@ -18,7 +18,7 @@ class Plugin(NamedTuple):
     """A package that reads a format."""
 
     name: str
-    """Of the format."""
+    """The format's name in messages."""
     format: str
     """Pillow's name for it."""
     begins: Callable[[bytes], bool]
@@ -28,7 +28,7 @@ class Plugin(NamedTuple):
     register: str
     """Function of the module that tells Pillow of it; empty: its import does."""
     extra: str
-    """Of this project."""
+    """This project's extra that installs it."""
 
 
 PLUGINS = (

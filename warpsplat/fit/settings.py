@@ -356,7 +356,7 @@ class Settings:
         False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
     simple: bool = option(
-        False, "Outlines of fills that do not cross themselves; those of drawings never do.", refine=True
+        False, "Outlines of fills that do not cross themselves, as those of drawings.", refine=True
     )
     separate: bool = option(False, "A path for each connected part of a colour, with its holes.", refine=True)
     stack: Stack = option(

@@ -30,7 +30,6 @@ LEAST = 0.1
 PIECES, SAMPLES = 8, 9
 """Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
 
-
 GROWN = 0.02
 """By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
 

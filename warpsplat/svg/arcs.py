@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 LARGEST_BULGE = 0.5
-"""Of an arc of 106 degrees; a longer one may run round the wrong side of its curve."""
+"""The bulge of an arc of 106 degrees; a longer one may run round the wrong side of its curve."""
 
 KINK = 1e-3
 """Largest difference of bulges at both ends of a curve that one arc replaces: 0.2 degrees."""

@@ -23,7 +23,7 @@ CURVES = ("arcs", "splines", "lines", "r12")
 """How curves are written: as arcs of polylines, as exact splines, as lines, as lines in the old version."""
 
 MILLIMETRES = 25.4
-"""Of an inch."""
+"""Millimetres in an inch."""
 
 TOLERANCE = 1 / 20_000
 """Largest distance of arcs and lines from curves, over the page's longer side."""

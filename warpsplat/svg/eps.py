@@ -16,7 +16,7 @@ from warpsplat.svg.paths import Subpath
 from warpsplat.svg.shapes import LineStyle, Shape
 
 POINTS = 72.0
-"""Of an inch."""
+"""Points in an inch."""
 
 DECIMALS = 3
 """Decimals of coordinates [pt]."""

@@ -16,7 +16,7 @@ INCH = 25.4
 """Length of an inch [mm]."""
 
 PIXELS_AN_INCH = 96.0
-"""Of CSS, for images without a resolution."""
+"""Resolution of images that state none, as in CSS."""
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": INCH, "pt": INCH / 72, "px": INCH / PIXELS_AN_INCH}
 """Length of a CSS unit [mm]."""
