@@ -269,20 +269,33 @@ def _shown_and_wanted(shown: Bytes, target: Rows, paper: int) -> Iterator[Pair]:
 
     Those of large images are computed strip by strip on demand.
     """
-    height, width, channels = target.shape
+    height, width, _ = target.shape
+    levels = _levels(target, paper)
+    is_opaque = bool((shown[..., 3] == 255).all())
 
     def rows_for(channel: int, rows: slice) -> tuple[Floats, Floats]:
-        alpha = shown[rows, :, 3] / np.float32(255)
-        flat = shown[rows, :, channel] * alpha + np.float32(paper) * (1 - alpha)
-        part = target[rows]
-        wanted = part[..., channel] * np.float32(255)
-        if channels == 4:
-            wanted = wanted + np.float32(paper) * (1 - part[..., 3])
-        return flat, np.round(wanted)
+        flat = shown[rows, :, channel].astype(np.float32)
+        if not is_opaque:
+            alpha = shown[rows, :, 3] / np.float32(255)
+            flat = np.asarray(flat * alpha + np.float32(paper) * (1 - alpha), np.float32)
+        return flat, levels[rows, :, channel].astype(np.float32)
 
     for channel in range(3):
         make = functools.partial(rows_for, channel)
         yield Pair(width, height, make) if width * height > WHOLE_PIXELS else Pair.of(*make(slice(0, height)))
+
+
+def _levels(target: Rows, paper: int) -> Bytes:
+    """Return an image in 8-bit levels on grey of level ``paper``, shape (height, width, 3)."""
+    height, width, channels = target.shape
+    levels = np.empty((height, width, 3), np.uint8)
+    for rows in rows_of(width, height):
+        part = target[rows]
+        wanted = part[..., :3] * np.float32(255)
+        if channels == 4:
+            wanted += np.float32(paper) * (1 - part[..., 3:])
+        levels[rows] = np.round(wanted, out=wanted)
+    return levels
 
 
 def _in_8_bits(shown: Bytes, target: Rows, paper: int) -> tuple[Bytes, Bytes]:

@@ -16,6 +16,7 @@ from warpsplat.drawing.trace.regions import MOST_NOISE
 from warpsplat.drawing.trace.seeds import EDGE
 from warpsplat.errors import counted
 from warpsplat.scene import FloatArray
+from warpsplat.svg.viewer import rows_of
 
 Subject = Literal["photo", "drawing", "pixel"]
 
@@ -38,12 +39,13 @@ def guess_subject(image: FloatArray) -> Guess:
     Args:
         image: sRGB in [0, 1], shape (height, width, 3); premultiplied with opacity, shape (height, width, 4).
     """
-    cells = _cells(image)
+    levels = _levels(image)
+    cells = _cells(levels)
     if cells:
         return Guess("pixel", cells)
     height, width = image.shape[:2]
     top, left = max(0, height - PART) // 2, max(0, width - PART) // 2
-    why = _flat_colors(_levels(image[top : top + PART, left : left + PART]))
+    why = _flat_colors(levels[top : top + PART, left : left + PART])
     if why:
         return Guess("drawing", why)
     if min(height, width) * height * width <= TINY * TINY * TINY:
@@ -53,7 +55,11 @@ def guess_subject(image: FloatArray) -> Guess:
 
 def _levels(image: FloatArray) -> Ints:
     """Return an image in levels of 0..255."""
-    return np.round(np.asarray(image) * 255).astype(np.int16)
+    image = np.asarray(image)
+    levels = np.empty(image.shape, np.int16)
+    for rows in rows_of(image.shape[1], image.shape[0]):
+        levels[rows] = np.round(image[rows] * 255)
+    return levels
 
 
 WINDOW = 6  # [px] side of the squares that two colours each should explain
@@ -146,13 +152,13 @@ SOFT = 0.2
 codes have 0.19 or less, icons and photographs of 16 to 256 px 0.21 or more."""
 
 
-def _cells(image: FloatArray) -> str | None:
+def _cells(levels: Ints) -> str | None:
     """Return what the cells of pixel art are like that explain an image; None if none do."""
-    across, down = changes(_levels(image))
+    across, down = changes(levels)
     size = int(np.gcd.reduce(np.concatenate([across, down])))
-    sides = image.shape[0] // size, image.shape[1] // size
+    sides = levels.shape[0] // size, levels.shape[1] // size
     if (len(across) - 1) * (len(down) - 1) <= MOST_CELLS:
-        cells = _levels(image[down[:-1, None], across[:-1]])
+        cells = levels[down[:-1, None], across[:-1]]
         count = len(np.unique(cells.reshape(-1, cells.shape[2]), axis=0))
         is_small = CELLS[0] <= min(sides) and max(sides) <= (CELLS[1] if size > 1 else SPRITE)
         runs = np.diff(across), np.diff(down)
@@ -162,7 +168,7 @@ def _cells(image: FloatArray) -> str | None:
             return f"{counted(count, 'colour')} in cells of {size}x{size} px"
         if is_scaled and is_hard:
             return f"{counted(count, 'colour')} with hard edges"
-    lattice = find_lattice(_levels(image).astype(np.uint8))
+    lattice = find_lattice(levels.astype(np.uint8))
     if lattice is None or not _has_hard_corners(lattice.palette[lattice.colors]):
         return None
     return (
