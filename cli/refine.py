@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
@@ -27,35 +28,44 @@ from warpsplat.fit.settings import make_settings
 @click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=INPUT)
 @click.argument("image", type=INPUT)
-@click.option(
+@option_in(
+    "Files",
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is the standard output.  "
+    common=True,
+    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout.  "
     "[default: SVG-refined.svg, here]",
 )
 @overwrite_option
-@click.option(
+@option_in(
+    "Fitting",
     "--iterations",
+    common=True,
     type=int,
     default=200,
     show_default=True,
     metavar="N",
     help="Number of optimisation steps.",
 )
-@click.option(
-    "--max-memory", metavar="SIZE", help="Memory limit, such as 4GB; an image that needs more is refused."
+@option_in(
+    "Goals and limits",
+    "--max-memory",
+    metavar="SIZE",
+    help="Memory limit, such as 4GB; an image that needs more is refused.",
 )
 @quality_options(refine=True)
-@click.option(
+@option_in(
+    "Contents of the SVG",
     "--keep",
+    common=True,
     is_flag=True,
     help="Leave text, images, filters ... unchanged; without this, an SVG that has them is refused.",
 )
 @checkpoint_options
 @hook_options("refine")
 @run_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
     svg: Path,
     image: Path,

@@ -12,6 +12,7 @@ from warpsplat.cli.options import (
     INPUT,
     OUTPUT,
     Request,
+    device_option,
     option_called,
     overwrite_option,
     quiet_option,
@@ -41,8 +42,7 @@ from warpsplat.fit.settings import DxfCurves
     show_default=True,
     help="viewer: resvg, for any SVG. exact, splat: the renderers of fits, for SVGs with paths only.",
 )
-@click.option(
-    "--device",
+@device_option(
     default="auto",
     show_default=True,
     help="For exact and splat: auto (a GPU if there is one), cpu, or cuda:N.",

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
@@ -22,35 +23,45 @@ from warpsplat.cli.options import (
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.errors import UsageError
 from warpsplat.extensions import declared, load
-from warpsplat.run.options import settings_from, with_preset
+from warpsplat.run.options import preset_names, settings_from, with_preset
 
 
 @click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=INPUT, nargs=-1, required=True, metavar="IMAGE...")
-@click.option(
+@option_in(
+    "Files",
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is stdout; of several images a folder, of several"
-    " numbers of shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
+    common=True,
+    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout. For several results a folder, or"
+    " OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@click.option(
+@option_in(
+    "What to make",
     "--preset",
+    common=True,
+    values=preset_names,
+    files=True,
     metavar="NAME",
-    help="Options of a style (brush, ink, low-poly, placeholder, poster, stained-glass), for a machine"
-    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside it"
-    " count more.",
+    help="Options for a style (brush, ink, low-poly, placeholder, poster, stained-glass) or a machine"
+    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside"
+    " it count more.",
 )
 @quality_options(several=True)
 @importance_option
 @checkpoint_options
 @hook_options("vectorize")
 @run_options
-@click.option(
-    "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
+@option_in(
+    "Files",
+    "--data-uri",
+    "as_uri",
+    is_flag=True,
+    help="Print the SVG as a data URI; the figures go to stderr.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 @suggest_option
 def command(
     images: tuple[Path, ...],

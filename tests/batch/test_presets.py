@@ -37,9 +37,9 @@ def test_those_for_machines_make_outlines_of_a_known_size(name: str, tmp_path: P
 
 
 def test_options_beside_a_preset_count_more() -> None:
-    settings = make_settings(**with_preset("brush", {"curves": 12, "kind": None, "quality": None}))
+    settings = make_settings(**with_preset("brush", {"curves": 12, "closed": None, "quality": None}))
     assert settings.curves == 12 and settings.kind == Kind.STROKE and settings.spline_points == 5
-    closed = make_settings(**with_preset("brush", {"kind": Kind.FILL}))
+    closed = make_settings(**with_preset("brush", {"closed": True}))
     assert closed.kind == Kind.FILL
 
 

@@ -42,6 +42,25 @@ the option is ignored with a note. If the subject was detected the option is ign
 for fitted shapes: then the image is fitted as a photograph, and a note says so."""
 
 
+Group = Literal[
+    "Batch",
+    "What to make",
+    "Shapes",
+    "Colours",
+    "Goals and limits",
+    "Fitting",
+    "Drawings",
+    "Size on paper",
+    "Cutters and plotters",
+    "Contents of the SVG",
+    "Files",
+    "Run",
+]
+"""Groups of options in help and documentation, in their order."""
+
+GROUPS: tuple[Group, ...] = get_args(Group)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Option:
     """A setting as it is given. What a declaration leaves out follows from the field's type and default."""
@@ -53,10 +72,14 @@ class Option:
     default: Any = None
     shown_default: str | None = None  # the default as help shows it, if not as it is
     help: str = ""  # empty if it cannot be given by this name
+    group: Group | None = None  # of one that has a flag
+    common: bool = False  # whether it is one of those that most people need
     research: bool = False  # a key of batch files and a keyword of make_settings, but no flag
     refine: bool = False  # whether refine takes it as well
     limits: tuple[float, float] | None = None  # of a number, else positive; of the length of a text
     choices: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()  # values with names, of an option that takes others as well
+    files: bool = False  # whether a value may be the name of a file
     pattern: str = ".*"  # regular expression for a text, which "wanted" describes
     wanted: str = ""  # values that are accepted, in words
     metavar: str = ""
@@ -110,7 +133,8 @@ class Option:
             for key, inner in value.items():
                 number.check(inner, f"{prefix}{self.name} {key}")
         elif not (self._accepted(value) or (value is None and self.default is None)):
-            raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}")
+            meant = nearest(value, self.choices or self.values) if isinstance(value, str) else ""
+            raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}{meant}")
 
     def _accepted(self, value: Any) -> bool:
         if self.choices:
@@ -162,7 +186,10 @@ def options_of(declaring: type) -> tuple[Option, ...]:
             type=get_origin(kind) or kind,
             choices=choices or declared.choices,
             metavar=declared.metavar or ("N" if kind is int and not declared.parse else ""),
-            shorthands=tuple(dataclasses.replace(s, field=field.name) for s in declared.shorthands),
+            shorthands=tuple(
+                dataclasses.replace(s, field=field.name, group=s.group or declared.group)
+                for s in declared.shorthands
+            ),
         )
         found.append(made)
     return tuple(found)
@@ -175,10 +202,15 @@ def limits_of(declaring: type, name: str) -> tuple[float, float]:
     return found
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'colors'?"`` for a name like one of the ``known``, else nothing."""
-    found = difflib.get_close_matches(name, [*known], 1)
-    return f"; did you mean {found[0]!r}?" if found else ""
+def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return ``"; did you mean 'colors'?"`` for a name like one of the ``known``, else nothing.
+
+    ``prefix``: what all of them begin with, such as dashes; it says nothing about likeness.
+    """
+    found = difflib.get_close_matches(
+        name.removeprefix(prefix), [each.removeprefix(prefix) for each in known], 1
+    )
+    return f"; did you mean {prefix + found[0]!r}?" if found else ""
 
 
 def _words(value: object) -> str:

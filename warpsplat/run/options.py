@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,12 @@ def read_palette(path: Path) -> str:
         raise UsageError(
             f"palette {printable(str(path))}: {cause}; colours begin with #, {QUOTED}"
         ) from error
+
+
+def preset_names() -> Sequence[str]:
+    """Return the names of all presets."""
+    target = declared("provides").get("preset_names")
+    return load(target)() if target else ()
 
 
 def with_preset(preset: str | None, given: dict[str, Any]) -> dict[str, Any]:
