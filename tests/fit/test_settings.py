@@ -92,6 +92,7 @@ def test_density_may_be_given_in_part() -> None:
         ({"levels": "5,5"}, "levels must be ascending numbers of shapes"),
         ({"levels": "4,8", "curves": 9}, "curves 9 and the last of the levels"),
         ({"levels": "4,8", "max_bytes": "4KB"}, "levels and max-bytes"),
+        ({"subject": "photo", "bridges": "2"}, "subject photo and bridges 2 cannot be combined"),
         ({"size": "9x9mm", "page": "a4"}, "size and page cannot be combined"),
     ],
 )

@@ -458,7 +458,6 @@ class Settings:
         metavar="N",
         parse=str,
         subjects=("drawing",),
-        elsewhere="ignored",
         group="Cutters and plotters",
     )
     symbols: bool = option(
