@@ -88,7 +88,7 @@ def command(
         raise UsageError("only one of SVG and image can come from the standard input")
     output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import decibels, echo_exceptions, finish, watched
+    from warpsplat.cli.run import decibels, echo_exceptions, echo_unused_dxf, finish, watched
     from warpsplat.run.refine import refine
     from warpsplat.run.result import finite
     from warpsplat.svg.inspect import MAX_BYTES
@@ -116,6 +116,7 @@ def command(
     before = math.inf if result.before is None else result.before
     if not request.quiet:
         echo_exceptions(input_name(svg), result)
+        echo_unused_dxf(given.get("dxf"), output)
     values = {"svg": str(svg), "output": str(output), "psnr_before": finite(before), **result.as_dict()}
     if keep:
         values["kept"] = result.kept

@@ -51,6 +51,7 @@ from warpsplat.fit.settings import DxfCurves
 @quiet_option
 def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **given: Any) -> None:
     """Convert any SVG to a PNG or PDF, or its paths to a DXF or EPS; - is the standard input."""
+    from warpsplat.cli.run import echo_unused_dxf
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result
@@ -81,5 +82,7 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
             write_named(output, text, zoom=scale, dxf=dxf or "arcs")
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
+    if not request.quiet:
+        echo_unused_dxf(dxf, output)
     if not request.quiet and output != STANDARD:
         echo(f"{output}: {output.stat().st_size / 1000:.1f} kB")

@@ -130,7 +130,7 @@ def single(
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
     inputs, data = request.inputs, read_input(image)
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_notes, finish, requested, watched
+    from warpsplat.cli.run import echo_notes, echo_unused_dxf, finish, requested, watched
     from warpsplat.run.command_line import vectorize_command
     from warpsplat.run.vectorize import vectorize
 
@@ -148,6 +148,7 @@ def single(
         hooks.show(result, data)
     if not request.quiet:
         echo_notes(image, settings, result, verbose=request.verbose)
+        echo_unused_dxf(given.get("dxf"), output)
     if as_uri:
         from warpsplat.svg.numbers import data_uri
 

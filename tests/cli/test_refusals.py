@@ -65,7 +65,7 @@ USAGE = [
     ("vectorize missing.png --page b5", "page must be one of"),
     ("vectorize missing.png --units ell", "units must be one of"),
     ("refine drawing.svg photo.png -o a.svg --iterations 0", "iterations"),
-    ("refine drawing.svg photo.png -o a.svg --background yellow", "background"),
+    ("refine drawing.svg photo.png -o a.svg --background yelow", "did you mean 'yellow'?"),
     ("vectorize ''", "the name of the file is empty"),
     ("eval drawing.svg photo.png", "eval takes the image first, then the SVG"),
     *[(f"vectorize photo.png {option} many", "is not a whole number") for option in ("--threads", "--seed")],

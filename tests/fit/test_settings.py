@@ -64,8 +64,8 @@ def test_density_may_be_given_in_part() -> None:
         *(({"basis": bad}, "basis must be one of cubic, spline, not") for bad in ("quartic", 7)),
         ({"quality": "best"}, "quality must be one of draft, balanced, high, not 'best'"),
         (
-            {"background": "red"},
-            "background must be auto, none or a colour such as '#fff' (in quotes, ",
+            {"background": "rad"},
+            "background must be auto, none or a colour such as white or '#fff' (in quotes, ",
         ),
         ({"title": "x" * 1001}, "title must be a text of at most 1000 characters"),
         ({"rates": 3}, "rates must be a mapping"),
@@ -117,7 +117,7 @@ def test_times_and_sizes() -> None:
                 parse(bad)
 
 
-@pytest.mark.parametrize("color", ["#fff", "#FFF", "#FFFFFF", " #ffffff"])
+@pytest.mark.parametrize("color", ["#fff", "#FFF", "#FFFFFF", " #ffffff", "White"])
 def test_one_reading_of_colours(color: str) -> None:
     assert make_settings(background=color).background == "#ffffff"
     assert make_settings(palette=color).palette == ("#ffffff",)

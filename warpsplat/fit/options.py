@@ -32,6 +32,12 @@ MAX_DIGITS = 15
 
 COLOR = re.compile(r"#([0-9a-f]{3}|[0-9a-f]{6})", re.IGNORECASE)
 
+COLOR_NAMES = (
+    *("aqua", "black", "blue", "fuchsia", "gray", "green", "lime", "maroon"),
+    *("navy", "olive", "purple", "red", "silver", "teal", "white", "yellow"),
+)
+"""Names of colours that are suggested; all of CSS are known."""
+
 QUOTED = "in quotes, as an unquoted # begins a comment"
 """How shells and YAML files want colours, for messages."""
 
@@ -251,10 +257,13 @@ def parse_levels(value: object) -> tuple[int, ...]:
 
 
 def color_of(text: str) -> str | None:
-    """Return ``#F80`` or ``#ff8800`` as ``#ff8800``; None for anything else."""
+    """Return ``#F80``, ``#ff8800`` or the name of a CSS colour as ``#ff8800``; None for anything else."""
     found = COLOR.fullmatch(text)
     if not found:
-        return None
+        from PIL import ImageColor  # not for help
+
+        is_name = text.lower() in ImageColor.colormap
+        return "#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(text)) if is_name else None
     digits = found[1].lower()
     return "#" + (digits if len(digits) == 6 else "".join(2 * digit for digit in digits))
 
@@ -265,7 +274,7 @@ def parse_background(value: object) -> object:
 
 
 def parse_palette(value: object) -> tuple[str, ...]:
-    """Return ``#f00,#00ff00``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
+    """Return ``#f00,lime``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
 
     Raises ``UsageError`` for anything else.
     """
@@ -274,6 +283,6 @@ def parse_palette(value: object) -> tuple[str, ...]:
     for part in parts:
         color = color_of(_words(part))
         if color is None:
-            raise UsageError(f"palette must be colours such as '#ff8800,#fff' ({QUOTED}), not {shown(part)}")
+            raise UsageError(f"palette must be colours such as '#ff8800,white' ({QUOTED}), not {shown(part)}")
         colors[color] = None
     return tuple(colors)

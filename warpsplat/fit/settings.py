@@ -16,6 +16,7 @@ from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     COLOR,
+    COLOR_NAMES,
     QUOTED,
     Option,
     color_of,
@@ -305,8 +306,9 @@ class Settings:
     )
     palette: tuple[str, ...] = option(
         (),
-        "The only colours, as '#f80,#fff' in quotes, or a file of them.",
+        "The only colours, as '#f80,white' in quotes, or a file of them.",
         metavar="COLORS",
+        values=COLOR_NAMES,
         files=True,
         parse=parse_palette,
         group="Colours",
@@ -361,11 +363,11 @@ class Settings:
     seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING, group="Fitting")
     background: str = option(
         "auto",
-        "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
+        "auto (transparent where the image is), none, or a colour: white, or '#fff' in quotes.",
         pattern=f"auto|none|(?i:{COLOR.pattern})",
-        wanted=f"auto, none or a colour such as '#fff' ({QUOTED})",
+        wanted=f"auto, none or a colour such as white or '#fff' ({QUOTED})",
         metavar="COLOR",
-        values=("auto", "none"),
+        values=("auto", "none", *COLOR_NAMES),
         parse=parse_background,
         refine=True,
         group="Colours",
