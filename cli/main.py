@@ -187,6 +187,9 @@ NUMBERS = {"integer": "a whole number", "float": "a number"}
 NUMBER = re.compile("a valid (integer|float)(?: range)?")
 """Types of numbers in the words of click, and in ours."""
 
+RANGE = re.compile(r"is not in the range (?:(\S+?)<=?x<=?(\S+)|x>=(\S+))")
+"""Ranges in the words of click."""
+
 
 def hint_for(flag: str) -> str:
     """Return what messages add about an option without its value."""
@@ -221,6 +224,12 @@ def message_of(error: BaseException) -> tuple[str, int]:
         if isinstance(error, click.BadOptionUsage):
             message += hint_for(error.option_name)
         if isinstance(error, click.BadParameter):
+            message = RANGE.sub(
+                lambda found: (
+                    f"is less than {found[3]}" if found[3] else f"is not between {found[1]} and {found[2]}"
+                ),
+                message,
+            )
             message = NUMBER.sub(lambda found: NUMBERS[found[1]], message)
             message = QUOTED.sub(lambda found: f"{found[1]}{cut(found[2])}{found[1]}", message)
         return printable(cut(message, LONGEST_MESSAGE)) + help_of, error.exit_code

@@ -16,7 +16,7 @@ from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD, input_name
 from warpsplat.files.remote import is_url, path_of
 from warpsplat.fit.options import Option, nearest
-from warpsplat.run.options import OPTIONS
+from warpsplat.run.options import OPTIONS, preset_names
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -57,6 +57,18 @@ importance_option = option_in(
     type=INPUT,
     metavar="MASK",
     help="Image of the same proportions: errors count most where it is white, least where it is black.",
+)
+
+preset_option = option_in(
+    "What to make",
+    "--preset",
+    common=True,
+    values=preset_names,
+    files=True,
+    metavar="NAME",
+    help="Options for a style (brush, ink, low-poly, placeholder, poster, stained-glass) or a machine"
+    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside"
+    " it count more.",
 )
 
 overwrite_option = option_in(

@@ -63,11 +63,11 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
     check_draws_files(renderer)
     request = Request.taken(svg, given)
     output = request.output_for(svg, ".png")
+    text = read_svg_text(svg)
     check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=request.overwrite)
     check_format(output)
     if renderer != "viewer" and output.suffix.lower() != ".png":
         raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
-    text = read_svg_text(svg)
     try:
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer != "viewer":

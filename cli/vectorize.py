@@ -17,13 +17,14 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
+    preset_option,
     quality_options,
     run_options,
 )
 from warpsplat.cli.suggest import NOTHING_ELSE, suggest_number, suggest_option
 from warpsplat.errors import UsageError
 from warpsplat.extensions import declared, load
-from warpsplat.run.options import preset_names, settings_from, with_preset
+from warpsplat.run.options import settings_from, with_preset
 
 
 @click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -38,17 +39,7 @@ from warpsplat.run.options import preset_names, settings_from, with_preset
     " OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@option_in(
-    "What to make",
-    "--preset",
-    common=True,
-    values=preset_names,
-    files=True,
-    metavar="NAME",
-    help="Options for a style (brush, ink, low-poly, placeholder, poster, stained-glass) or a machine"
-    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside"
-    " it count more.",
-)
+@preset_option
 @quality_options(several=True)
 @importance_option
 @checkpoint_options

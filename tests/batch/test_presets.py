@@ -52,6 +52,8 @@ def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixt
     own.write_text("shape: circle\ncurves: 99\ndensity: {surplus: 1}\n", "utf-8")
     assert run("vectorize", image, "-o", tmp_path / "b.svg", "--preset", own, *quick) == 0
     assert (tmp_path / "b.svg").read_text("utf-8").count("<circle") == 6
+    assert run("batch", image, "-o", tmp_path / "e.svg", "--preset", own, "--shape", "triangle", *quick) == 0
+    assert (tmp_path / "e.svg").read_text("utf-8").count("<polygon") == 6
     assert run("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick) == 2
     assert "known are: brush, embroidery" in one_line(capfd.readouterr().err)
     own.write_text("shape: circle\ncurve: 99\n", "utf-8")

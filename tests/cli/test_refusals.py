@@ -51,7 +51,8 @@ USAGE = [
     ("vectorize photo.png --quality best", "--quality"),
     ("vectorize photo.png --subject foto", "did you mean 'photo'?"),
     ("vectorize photo.png --shape rectangel", "did you mean 'rectangle'?"),
-    ("vectorize photo.png --threads 0", "--threads"),
+    ("vectorize photo.png --threads 0", "'--threads': 0 is less than 1"),
+    ("serve --port 99999", "99999 is not between 0 and 65535"),
     ("vectorize photo.png --time-budget soon", "not a time"),
     ("vectorize photo.png --max-bytes -1", "not a size"),
     (f"vectorize photo.png --max-bytes {400 * '9'}", "not a size"),
@@ -150,6 +151,7 @@ USAGE = [
 ]
 
 INPUT = [
+    ("render photo.png", "photo.png: not an SVG"),
     *[
         (line.replace("photo.png", name), name)
         for line in map(VALID.__getitem__, ("vectorize", "refine", "eval", "compare"))

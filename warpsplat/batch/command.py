@@ -17,6 +17,7 @@ from warpsplat.cli.echo import echo
 from warpsplat.cli.help import GroupedCommand
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.files.inputs import STANDARD
+from warpsplat.run.options import with_preset
 
 if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
@@ -48,6 +49,7 @@ def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **give
     Its paths are relative to it. What the command line says is stronger.
     """  # noqa: D301
     options = {each.name: given.pop(each.name) for each in fields(BatchOptions) if each.name in given}
+    given = with_preset(given.pop("preset"), given)
     perform(inputs, flags_of(given), sets, BatchOptions(**options))
 
 

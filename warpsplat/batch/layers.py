@@ -109,7 +109,8 @@ def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
         elif key not in TEXT_KEYS:  # they are texts already
             settings_from({key.replace("-", "_"): value})
     except (UsageError, TypeError) as error:
-        raise error_at(f"{name}: {error}") from error
+        said = str(error)
+        raise error_at(said if said.startswith(f"{name} ") else f"{name}: {said}") from error
 
 
 def _check_kinds(layer: Layer) -> None:

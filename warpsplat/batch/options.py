@@ -15,6 +15,7 @@ from warpsplat.cli.options import (
     device_option,
     importance_option,
     overwrite_option,
+    preset_option,
     quality_options,
     threads_option,
     together,
@@ -130,11 +131,11 @@ batch_options = together(
         "--report",
         type=OUTPUT,
         metavar="DIR",
-        common=True,
         help="Pages on the results, and DIR/index.html, which lists them; or a name that ends with .html.",
     )
     if "pages" in extensions()
     else lambda function: function,
+    preset_option,
     quality_options(),
     importance_option,
     device_option(),
