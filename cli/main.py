@@ -80,7 +80,7 @@ class LazyGroup(click.Group):
         if not os.path.isfile(name) and not is_url(name):
             if os.path.splitext(name)[1] or os.path.basename(name) != name:
                 raise ImageError(f"{name}: no such file")
-            hint = nearest(name, COMMANDS) or f"; commands are {', '.join(COMMANDS)}"
+            hint = nearest(name, [*COMMANDS, "--help"]) or f"; commands are {', '.join(COMMANDS)}"
             ctx.fail(f"no such command or file: {name}{hint}")
         commands = FOR_FILES.get(os.path.splitext(name)[1].lower(), ())
         others = [words for words in commands if words.split()[0] in COMMANDS]
@@ -107,19 +107,23 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+EXIT_CODES = """\b
+Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
+or checkpoint, 4 result could not be written, 5 some images of a batch failed,
+6 a goal was missed, 7 not enough memory, threads or kernel cache, or a GPU
+that cannot be used or failed, 130 interrupted, 143 terminated.
+"""
+
+
+@click.group(cls=LazyGroup, epilog=EXIT_CODES, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="warpsplat")
 def cli() -> None:
-    """Turn raster images into SVGs of Bézier shapes by gradient descent.
-
-    "warpsplat photo.jpg" writes photo.svg; "warpsplat COMMAND --help" says what a
-    command can do.
+    """Turn photos, logos and drawings into SVGs.
 
     \b
-    Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
-    or checkpoint, 4 result could not be written, 5 some images of a batch failed,
-    6 a goal was missed, 7 not enough memory, threads or kernel cache, or a GPU
-    that cannot be used or failed, 130 interrupted, 143 terminated.
+    warpsplat photo.jpg              writes photo.svg
+    warpsplat photo.jpg --curves 64  with 64 shapes
+    warpsplat COMMAND --help         says what a command can do
     """  # noqa: D301
 
 
