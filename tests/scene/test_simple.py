@@ -84,6 +84,18 @@ def test_a_ring_that_touches_itself_is_two() -> None:
     assert len(made.contours_of(0)) == 2
 
 
+def test_a_ring_with_a_node_on_one_of_its_lines_is_two() -> None:
+    scene = scene_of('d="M8 8H48V40L28 8L8 40z" fill="red"')
+    made = simple(scene, 16)
+    assert [len(made.contours_of(shape)) for shape in range(len(made))] == [2]
+    np.testing.assert_allclose(pixels(made), pixels(scene), atol=0.02)
+
+
+def test_rings_without_an_area_go() -> None:
+    made = simple(scene_of('d="M8 8H48V40H8zM10 10L20 20L10 10zM30 30v.1h.1z" fill="red"'), 16)
+    assert len(made.contours_of(0)) == 1
+
+
 def test_a_cubic_crosses_itself_once() -> None:
     cubic = np.array([[(0, 0), (40, 30), (-10, 30), (30, 0)]], np.float64)
     pairs, places = intersections(cubic)

@@ -90,9 +90,9 @@ def _loops(cubics: Floats) -> tuple[IndexArray, Floats]:
     """
     p, q, r, s = (cubics[:, i] for i in range(4))
     a, b, c = s - p + 3 * (q - r), 3 * (p + r - 2 * q), 3 * (q - p)
-    bend, square = _cross(a, b), (a * a).sum(axis=1)
+    bend, square = cross(a, b), (a * a).sum(axis=1)
     possible = (bend != 0) & (square > 0)
-    total = -_cross(a, c) / np.where(possible, bend, 1)
+    total = -cross(a, c) / np.where(possible, bend, 1)
     rest = -((b * total[:, None] + c) * a).sum(axis=1) / np.where(possible, square, 1)
     apart = 4 * rest - 3 * total * total  # the square of their difference
     half = 0.5 * np.sqrt(np.maximum(apart, 0))
@@ -133,7 +133,7 @@ def _crossing(
         pairs, own = pairs[meet], own[meet]
     (one, other), (i, j) = pairs.T, own.T
     a, b, c, d = lines[one, i], lines[one, i + 1], lines[other, j], lines[other, j + 1]
-    sides = [_cross(b - a, c - a), _cross(b - a, d - a), _cross(d - c, a - c), _cross(d - c, b - c)]
+    sides = [cross(b - a, c - a), cross(b - a, d - a), cross(d - c, a - c), cross(d - c, b - c)]
     found = (sides[0] * sides[1] < 0) & (sides[2] * sides[3] < 0)
     found &= np.min(np.abs(sides), axis=0, initial=np.inf) > TOUCH
     along = [(x / np.where(found, x - y, 1))[found] for x, y in (sides[2:], sides[:2])]
@@ -142,5 +142,6 @@ def _crossing(
     return pairs[found], t[own] + np.stack(along, axis=1) * (t[own + 1] - t[own])
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross products of vectors, shape (..., 2)."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -7,6 +7,7 @@ on both sides, or on neither, are left out.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ import numpy.typing as npt
 from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Rule
 from warpsplat.scene.geometry import beziers
-from warpsplat.scene.intersections import flattened, intersections, parts
+from warpsplat.scene.intersections import cross, flattened, intersections, parts
 from warpsplat.scene.scene import FloatArray, IndexArray, Scene, ranges, starts_of
 
 Floats = npt.NDArray[np.float64]
@@ -25,13 +26,16 @@ ROUNDS = 8
 """Times that a shape is made simple and rounded: rounding may make contours cross again, by a hair."""
 
 LEAST = 0.1
-"""Area [px²] of rings that are left out where contours are cut: nobody sees them."""
+"""Area [px²] of rings that are left out: nobody sees them."""
 
 PIECES, SAMPLES = 8, 9
 """Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
 
 GROWN = 0.02
 """By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
+
+UNEVEN = 0.01
+"""By how much the thirds of a line may differ [units]: more than single precision does."""
 
 Painted = Callable[[IndexArray], npt.NDArray[np.bool_]]
 """Whether there is paint, by how often contours wind around a place."""
@@ -105,7 +109,7 @@ def with_rings(scene: Scene, made: dict[int, list[Floats]], per_pixel: float) ->
 def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
     """Return rings of cubics that do not cross and fill the same; the same list if these do not.
 
-    New ends are whole numbers. New rings with an area below ``least`` are left out. Paint is to the right of
+    New ends are whole numbers. Rings with an area below ``least`` are left out. Paint is to the right of
     a ring on a screen: outer ones run clockwise.
 
     Args:
@@ -114,10 +118,11 @@ def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Fl
         least: Area [units²].
     """
     for _ in range(ROUNDS):
-        kept, new = uncrossed(rings)
-        if not new:
+        kept, new = uncrossed(_cut_at_nodes(rings))
+        seen = large(kept, least)
+        if not new and len(seen) == len(rings):
             break
-        rings = [*kept, *bounding(large(new, least), painted, kept)]
+        rings = [*seen, *bounding(large(new, least), painted, seen)]
     return rings
 
 
@@ -139,7 +144,12 @@ def joined(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
 
 def large(rings: list[Floats], least: float) -> list[Floats]:
     """Return the rings with an area of at least ``least`` [units²]."""
-    return [ring for ring in rings if abs(area(polygon(ring[..., :2]))) >= least]
+    if not rings:
+        return rings
+    lines = flattened(np.concatenate(rings)[..., :2], PIECES)
+    twice = cross(lines[:, :-1], lines[:, 1:]).sum(axis=1)
+    areas = 0.5 * np.bincount(np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]), twice)
+    return [ring for ring, found in zip(rings, areas, strict=True) if abs(found) >= least]
 
 
 def uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]]:
@@ -222,20 +232,55 @@ def _apart(ring: Floats) -> Iterator[Floats]:
             places = {place: index for place, index in places.items() if index < begin}
 
 
+def _cut_at_nodes(rings: list[Floats]) -> list[Floats]:
+    """Return rings with their lines cut where other nodes of the same ring lie on them."""
+    if not rings:
+        return rings
+    cubics, owner = np.concatenate(rings), np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    rows = np.flatnonzero(_are_lines(cubics))
+    start, along = cubics[rows, 0], cubics[rows, 3] - cubics[rows, 0]
+    # Rings side by side meet no others' nodes.
+    place = cubics[:, 0, 0] + owner * (1 + np.ptp(cubics[:, 0, 0]))
+    order = np.argsort(place, kind="stable")
+    first = np.searchsorted(place[order], place[rows] + np.minimum(along[:, 0], 0), "left")
+    last = np.searchsorted(place[order], place[rows] + np.maximum(along[:, 0], 0), "right")
+    line, node = np.repeat(np.arange(len(rows)), last - first), order[ranges(first, last - first)]
+    way, whole = cubics[node, 0] - start[line], along[line]
+    inside = (way * whole).sum(axis=1)
+    # Nodes are whole numbers: this is exact.
+    is_on = (cross(way, whole) == 0) & (inside > 0) & (inside < (whole * whole).sum(axis=1))
+    if not is_on.any():
+        return rings
+    line, node, inside = line[is_on], node[is_on], inside[is_on]
+    pieces = {}
+    for i in np.unique(line).tolist():
+        cuts = node[line == i][np.argsort(inside[line == i], kind="stable")]
+        ends = np.stack([start[i], *cubics[cuts, 0], start[i] + along[i]])
+        pieces[int(rows[i])] = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * np.arange(4)[:, None] / 3
+    cut = [pieces.get(i, cubics[i : i + 1]) for i in range(len(cubics))]
+    begins = starts_of(np.array([len(ring) for ring in rings])).tolist()
+    return [np.concatenate(cut[i:j]) for i, j in itertools.pairwise(begins)]
+
+
 def _part(cubic: Floats, start: float, end: float) -> Floats:
     return parts(cubic[None], np.array([start]), np.array([end]))[0]
 
 
 def _held(cubic: Floats, row: int, end: Floats) -> Floats:
     """Return a cubic in whole numbers with one ``end`` there; a line has its handles at the thirds."""
-    steps = np.diff(cubic[:, :2], axis=0)
-    is_line = np.abs(steps - steps[1]).max() <= 1e-6 * np.abs(steps).max()
+    is_line = _are_lines(cubic[None])[0]
     made = cubic.copy()
     made[:, :2] = np.round(made[:, :2])
     made[row, :2] = end
     if is_line:
         made[1, :2], made[2, :2] = (2 * made[0] + made[3])[:2] / 3, (made[0] + 2 * made[3])[:2] / 3
     return made
+
+
+def _are_lines(cubics: Floats) -> npt.NDArray[np.bool_]:
+    """Return which cubics have their handles at the thirds of a line."""
+    steps = np.diff(cubics[..., :2], axis=1)
+    return np.asarray(np.abs(steps - steps[:, 1:2]).max(axis=(1, 2)) <= UNEVEN)
 
 
 def reversed_ring(ring: Floats) -> Floats:
