@@ -1,4 +1,4 @@
-"""Help in groups: ``--help`` explains the options that most people need, ``--help-all`` all of them."""
+"""Help in groups: ``--help`` explains common options and names the others; ``--help-all`` explains all."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from warpsplat.fit.options import GROUPS, Group
 
 COLUMN = 26
 """Column where explanations begin."""
+
+SHOWS_ALL = "warpsplat.cli.help.shows_all"
+"""Key of ``click.Context.meta``: whether the help is to explain all options."""
 
 Values = Sequence[str] | Callable[[], Sequence[str]]
 """Values that shells complete, or a function that finds them."""
@@ -84,27 +87,26 @@ class GroupedCommand(click.Command):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options: all of them, or those that are common and the names of the others."""
         groups = self.groups(ctx)
-        if ctx.meta.get(_show_all.__name__):
+        if ctx.meta.get(SHOWS_ALL):
             for group, options in groups.items():
                 with formatter.section(group):
                     _write_rows(formatter, _records(ctx, options))
             return
-        is_common = {each: getattr(each, "common", False) for each in self.get_params(ctx)}
+        common = [each for each in self.get_params(ctx) if getattr(each, "common", False)]
         with formatter.section("Common options"):
-            _write_rows(formatter, _records(ctx, [each for each, common in is_common.items() if common]))
-        others = {group: [o for o in options if not is_common[o]] for group, options in groups.items()}
+            _write_rows(formatter, _records(ctx, common))
+        names = {
+            g: ", ".join(o.opts[-1] for o in options if o not in common) for g, options in groups.items()
+        }
         with formatter.section("More options"):
-            _write_rows(
-                formatter,
-                [(group, ", ".join(o.opts[-1] for o in left)) for group, left in others.items() if left],
-            )
+            _write_rows(formatter, ((group, left) for group, left in names.items() if left))
         formatter.write_paragraph()
         formatter.write_text(f"{ctx.command_path} --help-all explains all options.")
 
 
 def _show_all(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     if value and not ctx.resilient_parsing:
-        ctx.meta[_show_all.__name__] = True
+        ctx.meta[SHOWS_ALL] = True
         click.echo(ctx.get_help())
         ctx.exit()
 
@@ -118,7 +120,7 @@ def _write_rows(formatter: click.HelpFormatter, rows: Iterable[tuple[str, str]])
     """Write rows of two columns; the same in all groups, and not broken at hyphens."""
     for term, words in rows:
         first = f"{'':{formatter.current_indent}}{term}"
-        lines = textwrap.wrap(words, formatter.width - COLUMN, break_on_hyphens=False)
+        lines = textwrap.wrap(words, formatter.width - COLUMN, break_on_hyphens=False) or [""]
         start = [] if len(first) > COLUMN - 2 else [f"{first:{COLUMN}}{lines.pop(0)}"]
         for line in start or [first]:
             formatter.write(f"{line}\n")
