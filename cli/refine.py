@@ -21,6 +21,7 @@ from warpsplat.cli.options import (
 )
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
+from warpsplat.files.output import SVG_ENDINGS
 from warpsplat.files.remote import is_remote
 from warpsplat.fit.settings import make_settings
 
@@ -86,6 +87,8 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
+    if image.suffix.lower() in SVG_ENDINGS and svg.suffix.lower() not in SVG_ENDINGS:
+        raise UsageError(f"{image}: is an SVG; refine takes the SVG first, then the image")
     output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
     from warpsplat.cli.run import decibels, echo_exceptions, echo_unused_dxf, finish, watched

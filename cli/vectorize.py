@@ -114,12 +114,17 @@ def single(
     ``keeping``: the arguments of ``warpsplat.vectorize`` for checkpoints.
     """
     from warpsplat.files.inputs import STANDARD, read_input
+    from warpsplat.files.output import SVG_ENDINGS
 
     settings, image = settings_from(given), request.image
     output = request.output_for(image, ".svg")
     if as_uri and request.output == STANDARD:
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
     inputs, data = request.inputs, read_input(image)
+    if image.suffix.lower() in SVG_ENDINGS:
+        raise UsageError(
+            f"{image}: is an SVG, not an image; refine improves SVGs, render makes images of them"
+        )
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
     from warpsplat.cli.run import echo_notes, echo_unused_dxf, finish, requested, watched
     from warpsplat.run.command_line import vectorize_command

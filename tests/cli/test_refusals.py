@@ -68,6 +68,8 @@ USAGE = [
     ("refine drawing.svg photo.png -o a.svg --iterations 0", "iterations"),
     ("refine drawing.svg photo.png -o a.svg --background yelow", "did you mean 'yellow'?"),
     ("vectorize ''", "the name of the file is empty"),
+    ("vectorize drawing.svg", "drawing.svg: is an SVG, not an image; refine improves SVGs"),
+    ("refine photo.png drawing.svg", "refine takes the SVG first, then the image"),
     ("eval drawing.svg photo.png", "eval takes the image first, then the SVG"),
     *[(f"vectorize photo.png {option} many", "is not a whole number") for option in ("--threads", "--seed")],
     *[(f"{VALID['render']} --scale {scale}", "scale") for scale in ("0", "-1", "nan", "1e9", "1e308")],
