@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import click
 
+from warpsplat.cli.help import GroupedCommand
 from warpsplat.cli.options import Function, Request, together
 from warpsplat.errors import UsageError
 from warpsplat.extensions import extensions, load
@@ -101,7 +102,7 @@ def hook_options(command: str) -> Callable[[Function], Function]:
     return together(*(option for hook in hooks_of(command) for option in hook.options.values()))
 
 
-class HookedCommand(click.Command):
+class HookedCommand(GroupedCommand):
     """A command whose hooks may rewrite the words before they are parsed."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

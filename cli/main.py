@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import difflib
 import gc
 import itertools
 import json
@@ -17,6 +16,7 @@ import traceback
 from typing import Any, Literal, NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
 from warpsplat._version import __version__
 from warpsplat.cli.echo import echo, notices, open_standard_streams, silence
@@ -24,6 +24,7 @@ from warpsplat.cli.signals import Interrupt, handled, leave_compiler
 from warpsplat.errors import LONGEST_MESSAGE, ExitCode, ImageError, OutputError, cut, explain, printable
 from warpsplat.extensions import Command, declared, load
 from warpsplat.files.remote import is_url
+from warpsplat.fit.options import nearest
 
 COMMANDS: dict[str, Command] = {
     "vectorize": Command("Turn an image into an SVG.", "warpsplat.cli.vectorize:command"),
@@ -55,6 +56,13 @@ class LazyGroup(click.Group):
         """Return the command, or None for an unknown name."""
         return load(COMMANDS[cmd_name].target) if cmd_name in COMMANDS else None
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin as what is typed, and files: images need no command."""
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        found = [CompletionItem(n, help=c.help) for n, c in COMMANDS.items() if n.startswith(incomplete)]
+        return [CompletionItem(incomplete, type="file"), *found]  # bash forgets what comes before files
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -72,8 +80,7 @@ class LazyGroup(click.Group):
         if not os.path.isfile(name) and not is_url(name):
             if os.path.splitext(name)[1] or os.path.basename(name) != name:
                 raise ImageError(f"{name}: no such file")
-            found = difflib.get_close_matches(name, COMMANDS, 1)
-            hint = f"; did you mean {found[0]}?" if found else "; commands are " + ", ".join(COMMANDS)
+            hint = nearest(name, [*COMMANDS, "--help"]) or f"; commands are {', '.join(COMMANDS)}"
             ctx.fail(f"no such command or file: {name}{hint}")
         commands = FOR_FILES.get(os.path.splitext(name)[1].lower(), ())
         others = [words for words in commands if words.split()[0] in COMMANDS]
@@ -100,19 +107,23 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+EXIT_CODES = """\b
+Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
+or checkpoint, 4 result could not be written, 5 some images of a batch failed,
+6 a goal was missed, 7 not enough memory, threads or kernel cache, or a GPU
+that cannot be used or failed, 130 interrupted, 143 terminated.
+"""
+
+
+@click.group(cls=LazyGroup, epilog=EXIT_CODES, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="warpsplat")
 def cli() -> None:
-    """Turn raster images into SVGs of Bézier shapes by gradient descent.
-
-    "warpsplat photo.jpg" writes photo.svg; "warpsplat COMMAND --help" says what a
-    command can do.
+    """Turn photos, logos and drawings into SVGs.
 
     \b
-    Exit codes: 0 done, 1 internal error, 2 wrong usage, 3 unreadable image, SVG
-    or checkpoint, 4 result could not be written, 5 some images of a batch failed,
-    6 a goal was missed, 7 not enough memory, threads or kernel cache, or a GPU
-    that cannot be used or failed, 130 interrupted, 143 terminated.
+    warpsplat photo.jpg              writes photo.svg
+    warpsplat photo.jpg --curves 64  with 64 shapes
+    warpsplat COMMAND --help         says what a command can do
     """  # noqa: D301
 
 
@@ -180,6 +191,9 @@ NUMBERS = {"integer": "a whole number", "float": "a number"}
 NUMBER = re.compile("a valid (integer|float)(?: range)?")
 """Types of numbers in the words of click, and in ours."""
 
+RANGE = re.compile(r"is not in the range (?:(\S+?)<=?x<=?(\S+)|x>=(\S+))")
+"""Ranges in the words of click."""
+
 
 def hint_for(flag: str) -> str:
     """Return what messages add about an option without its value."""
@@ -204,12 +218,22 @@ def message_of(error: BaseException) -> tuple[str, int]:
     if isinstance(error, click.ClickException):
         context = getattr(error, "ctx", None)
         help_of = f" (see {context.command_path} --help)" if context else ""
-        if isinstance(error, click.NoSuchOption) and context and context.command is cli:
-            help_of = " (options follow a command: warpsplat vectorize IMAGE ...)"
-        message = " ".join(error.format_message().split())
+        message = " ".join(error.format_message().split()).rstrip(".")
+        message = message[:1].lower() + message[1:]
+        if isinstance(error, click.NoSuchOption) and context:
+            if context.command is cli:
+                help_of = " (options follow a command: warpsplat vectorize IMAGE ...)"
+            known = [each.opts[-1] for each in context.command.get_params(context)]
+            message = f"no such option: {error.option_name}{nearest(error.option_name, known, '--')}"
         if isinstance(error, click.BadOptionUsage):
-            message = message.rstrip(".") + hint_for(error.option_name)
+            message += hint_for(error.option_name)
         if isinstance(error, click.BadParameter):
+            message = RANGE.sub(
+                lambda found: (
+                    f"is less than {found[3]}" if found[3] else f"is not between {found[1]} and {found[2]}"
+                ),
+                message,
+            )
             message = NUMBER.sub(lambda found: NUMBERS[found[1]], message)
             message = QUOTED.sub(lambda found: f"{found[1]}{cut(found[2])}{found[1]}", message)
         return printable(cut(message, LONGEST_MESSAGE)) + help_of, error.exit_code

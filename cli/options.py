@@ -11,11 +11,12 @@ from typing import Any, TypeVar
 import click
 
 from warpsplat.cli.echo import set_verbosity
+from warpsplat.cli.help import option_in
 from warpsplat.errors import UsageError, shown
 from warpsplat.files.inputs import STANDARD, input_name
 from warpsplat.files.remote import is_url, path_of
-from warpsplat.fit.options import Option
-from warpsplat.run.options import OPTIONS
+from warpsplat.fit.options import Option, nearest
+from warpsplat.run.options import OPTIONS, preset_names
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -42,22 +43,36 @@ class OutputFile(click.Path):
 
 INPUT, OUTPUT = InputFile(), OutputFile()
 
-threads_option = click.option(
+threads_option = option_in(
+    "Run",
     "--threads",
     type=click.IntRange(min=1),
     metavar="N",
     help="CPU threads, at most 8 per core; the result is the same.  [default: one a core, up to 8]",
 )
 
-importance_option = click.option(
+importance_option = option_in(
+    "Fitting",
     "--importance",
     type=INPUT,
     metavar="MASK",
     help="Image of the same proportions: errors count most where it is white, least where it is black.",
 )
 
-overwrite_option = click.option(
-    "--overwrite", is_flag=True, help="Also replace files that warpsplat did not write."
+preset_option = option_in(
+    "What to make",
+    "--preset",
+    common=True,
+    values=preset_names,
+    files=True,
+    metavar="NAME",
+    help="Options for a style (brush, ink, low-poly, placeholder, poster, stained-glass) or a machine"
+    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside"
+    " it count more.",
+)
+
+overwrite_option = option_in(
+    "Files", "--overwrite", is_flag=True, help="Also replace files that warpsplat did not write."
 )
 
 
@@ -73,18 +88,21 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
 
 
 checkpoint_options = together(
-    click.option(
+    option_in(
+        "Files",
         "--checkpoint",
         type=OUTPUT,
         metavar="FILE",
         help="Save the state of the run in FILE, which is removed when the run is done.",
     ),
-    click.option(
+    option_in(
+        "Files",
         "--resume",
         is_flag=True,
         help="Continue from the checkpoint, to the same file as without a stop; without one, start.",
     ),
-    click.option(
+    option_in(
+        "Files",
         "--checkpoint-every",
         default="30s",
         show_default=True,
@@ -102,17 +120,25 @@ def _set_verbosity(context: click.Context, parameter: click.Parameter, value: in
     return value
 
 
-quiet_option = click.option("-q", "--quiet", is_flag=True, callback=_set_verbosity, help="Print errors only.")
+quiet_option = option_in(
+    "Run", "-q", "--quiet", is_flag=True, callback=_set_verbosity, help="Print errors only."
+)
 
 verbosity_options = together(
-    click.option("-v", "--verbose", count=True, callback=_set_verbosity, help="Print more, on stderr."),
+    option_in("Run", "-v", "--verbose", count=True, callback=_set_verbosity, help="Print more, on stderr."),
     quiet_option,
 )
 
+
+def device_option(**declared: Any) -> Callable[[Function], Function]:
+    """Return the flag of the device, with further arguments of ``click.option``."""
+    words = "auto (a GPU if there is one), cpu, or cuda:N."
+    values = ("auto", "cpu", "cuda:0")
+    return option_in("Run", "--device", **{"help": words, "metavar": "NAME", "values": values, **declared})
+
+
 run_options = together(
-    click.option(
-        "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
-    ),
+    device_option(default="auto", show_default=True),
     threads_option,
     verbosity_options,
 )
@@ -148,21 +174,39 @@ class Numbers(click.ParamType):
         return numbers
 
 
+class Choice(click.Choice[str]):
+    """One of several words."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the word; the message about another one suggests the nearest."""
+        if value not in self.choices:
+            self.fail(
+                f"{shown(value)} is not one of {', '.join(self.choices)}{nearest(value, self.choices)}",
+                param,
+                ctx,
+            )
+        return str(value)
+
+
 def flag(option: Option, *, several: bool = False) -> Callable[[Function], Function]:
     """Return the flag of an option in the table; ``several``: allow several numbers of shapes."""
-    name, default, words = f"--{option.name}", option.default_text, option.help
+    assert option.group
+    name, group = f"--{option.name}", option.group
+    default, words = option.default_text, option.help
     if option.value is not None:  # one of several flags for a field
         words += "  [default]" if default else ""
-        return click.option(name, option.field, flag_value=option.value, type=click.UNPROCESSED, help=words)
-    words += f"  [default: {default}]" if default else ""
+    elif default:
+        words += f"  [default: {default}]"
+    declared: dict[str, Any] = {"help": words, "common": option.common}
     if option.type is bool:
-        return click.option(name, is_flag=True, default=None, help=words)
+        return option_in(group, name, is_flag=True, default=None, **declared)
     kind: click.ParamType | type = str if option.parse else option.type
     if option.choices:
-        kind = click.Choice(option.choices)
+        kind = Choice(option.choices)
     if option.name == "curves":
         kind = Numbers(several=several)
-    return click.option(name, type=kind, metavar=option.metavar or None, help=words)
+    declared |= {"metavar": option.metavar or None, "values": option.values, "files": option.files}
+    return option_in(group, name, type=kind, **declared)
 
 
 def quality_options(*, several: bool = False, refine: bool = False) -> Callable[[Function], Function]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
@@ -20,6 +21,7 @@ from warpsplat.cli.options import (
 )
 from warpsplat.errors import UsageError
 from warpsplat.files.inputs import STANDARD, input_name, read_input
+from warpsplat.files.output import SVG_ENDINGS
 from warpsplat.files.remote import is_remote
 from warpsplat.fit.settings import make_settings
 
@@ -27,35 +29,44 @@ from warpsplat.fit.settings import make_settings
 @click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("svg", type=INPUT)
 @click.argument("image", type=INPUT)
-@click.option(
+@option_in(
+    "Files",
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is the standard output.  "
+    common=True,
+    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout.  "
     "[default: SVG-refined.svg, here]",
 )
 @overwrite_option
-@click.option(
+@option_in(
+    "Fitting",
     "--iterations",
+    common=True,
     type=int,
     default=200,
     show_default=True,
     metavar="N",
     help="Number of optimisation steps.",
 )
-@click.option(
-    "--max-memory", metavar="SIZE", help="Memory limit, such as 4GB; an image that needs more is refused."
+@option_in(
+    "Goals and limits",
+    "--max-memory",
+    metavar="SIZE",
+    help="Memory limit, such as 4GB; an image that needs more is refused.",
 )
 @quality_options(refine=True)
-@click.option(
+@option_in(
+    "Contents of the SVG",
     "--keep",
+    common=True,
     is_flag=True,
     help="Leave text, images, filters ... unchanged; without this, an SVG that has them is refused.",
 )
 @checkpoint_options
 @hook_options("refine")
 @run_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
     svg: Path,
     image: Path,
@@ -76,9 +87,11 @@ def command(
     settings = make_settings(**given)
     if svg == image == STANDARD:
         raise UsageError("only one of SVG and image can come from the standard input")
+    if image.suffix.lower() in SVG_ENDINGS and svg.suffix.lower() not in SVG_ENDINGS:
+        raise UsageError(f"{image}: is an SVG; refine takes the SVG first, then the image")
     output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import decibels, echo_exceptions, finish, watched
+    from warpsplat.cli.run import decibels, echo_exceptions, echo_unused_dxf, finish, watched
     from warpsplat.run.refine import refine
     from warpsplat.run.result import finite
     from warpsplat.svg.inspect import MAX_BYTES
@@ -106,6 +119,7 @@ def command(
     before = math.inf if result.before is None else result.before
     if not request.quiet:
         echo_exceptions(input_name(svg), result)
+        echo_unused_dxf(given.get("dxf"), output)
     values = {"svg": str(svg), "output": str(output), "psnr_before": finite(before), **result.as_dict()}
     if keep:
         values["kept"] = result.kept

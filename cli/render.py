@@ -12,6 +12,7 @@ from warpsplat.cli.options import (
     INPUT,
     OUTPUT,
     Request,
+    device_option,
     option_called,
     overwrite_option,
     quiet_option,
@@ -41,8 +42,7 @@ from warpsplat.fit.settings import DxfCurves
     show_default=True,
     help="viewer: resvg, for any SVG. exact, splat: the renderers of fits, for SVGs with paths only.",
 )
-@click.option(
-    "--device",
+@device_option(
     default="auto",
     show_default=True,
     help="For exact and splat: auto (a GPU if there is one), cpu, or cuda:N.",
@@ -51,6 +51,7 @@ from warpsplat.fit.settings import DxfCurves
 @quiet_option
 def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **given: Any) -> None:
     """Convert any SVG to a PNG or PDF, or its paths to a DXF or EPS; - is the standard input."""
+    from warpsplat.cli.run import echo_unused_dxf
     from warpsplat.files.inputs import STANDARD, input_name
     from warpsplat.files.marks import mark_png
     from warpsplat.files.output import check_output, write_result
@@ -62,11 +63,11 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
     check_draws_files(renderer)
     request = Request.taken(svg, given)
     output = request.output_for(svg, ".png")
+    text = read_svg_text(svg)
     check_output(output, svg, endings=PICTURE_ENDINGS, overwrite=request.overwrite)
     check_format(output)
     if renderer != "viewer" and output.suffix.lower() != ".png":
         raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
-    text = read_svg_text(svg)
     try:
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer != "viewer":
@@ -81,5 +82,7 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
             write_named(output, text, zoom=scale, dxf=dxf or "arcs")
     except ImageError as error:
         raise ImageError(f"{input_name(svg)}: {error}") from error
+    if not request.quiet:
+        echo_unused_dxf(dxf, output)
     if not request.quiet and output != STANDARD:
         echo(f"{output}: {output.stat().st_size / 1000:.1f} kB")

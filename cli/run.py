@@ -127,6 +127,12 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
     echo_exceptions(name, result)
 
 
+def echo_unused_dxf(dxf: str | None, output: Path) -> None:
+    """Print that ``--dxf``, if it is given, has no effect on files of other formats."""
+    if dxf is not None and output.suffix.lower() != ".dxf":
+        echo(f"warpsplat: {output}: --dxf {dxf} has no effect; give -o FILE.dxf", err=True)
+
+
 def echo_exceptions(name: str, result: Result) -> None:
     """Print what the run noted, which elements were kept, how the image was reduced, and how many shapes were
     reset, if any.

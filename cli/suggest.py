@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.help import option_in
 from warpsplat.errors import UsageError, counted
 
 if TYPE_CHECKING:
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
 NOTHING_ELSE = "--suggest takes one image, and writes nothing"
 
-suggest_option = click.option(
+suggest_option = option_in(
+    "What to make",
     "--suggest",
     is_flag=True,
     help="Suggest how many shapes the image is worth, and why, instead of making a file.",

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
@@ -16,6 +17,7 @@ from warpsplat.cli.options import (
     checkpoint_options,
     importance_option,
     overwrite_option,
+    preset_option,
     quality_options,
     run_options,
 )
@@ -27,30 +29,30 @@ from warpsplat.run.options import settings_from, with_preset
 
 @click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("images", type=INPUT, nargs=-1, required=True, metavar="IMAGE...")
-@click.option(
+@option_in(
+    "Files",
     "-o",
     "--output",
     type=OUTPUT,
-    help="SVG to write, or .svgz, .png, .pdf, .dxf, .eps; - is stdout; of several images a folder, of several"
-    " numbers of shapes a folder or OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
+    common=True,
+    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout. For several results a folder, or"
+    " OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
 )
 @overwrite_option
-@click.option(
-    "--preset",
-    metavar="NAME",
-    help="Options of a style (brush, ink, low-poly, placeholder, poster, stained-glass), for a machine"
-    " (embroidery, laser-cut, laser-engrave, plotter, stencil, vinyl), or of a YAML file; options beside it"
-    " count more.",
-)
+@preset_option
 @quality_options(several=True)
 @importance_option
 @checkpoint_options
 @hook_options("vectorize")
 @run_options
-@click.option(
-    "--data-uri", "as_uri", is_flag=True, help="Print the SVG as a data URI; the figures go to stderr."
+@option_in(
+    "Files",
+    "--data-uri",
+    "as_uri",
+    is_flag=True,
+    help="Print the SVG as a data URI; the figures go to stderr.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 @suggest_option
 def command(
     images: tuple[Path, ...],
@@ -112,14 +114,19 @@ def single(
     ``keeping``: the arguments of ``warpsplat.vectorize`` for checkpoints.
     """
     from warpsplat.files.inputs import STANDARD, read_input
+    from warpsplat.files.output import SVG_ENDINGS
 
     settings, image = settings_from(given), request.image
     output = request.output_for(image, ".svg")
     if as_uri and request.output == STANDARD:
         raise UsageError("the standard output takes one thing: -o - or --data-uri")
     inputs, data = request.inputs, read_input(image)
+    if image.suffix.lower() in SVG_ENDINGS:
+        raise UsageError(
+            f"{image}: is an SVG, not an image; refine improves SVGs, render makes images of them"
+        )
     hooks.check_files(inputs, output, keeping["checkpoint"], overwrite=request.overwrite)
-    from warpsplat.cli.run import echo_notes, finish, requested, watched
+    from warpsplat.cli.run import echo_notes, echo_unused_dxf, finish, requested, watched
     from warpsplat.run.command_line import vectorize_command
     from warpsplat.run.vectorize import vectorize
 
@@ -137,6 +144,7 @@ def single(
         hooks.show(result, data)
     if not request.quiet:
         echo_notes(image, settings, result, verbose=request.verbose)
+        echo_unused_dxf(given.get("dxf"), output)
     if as_uri:
         from warpsplat.svg.numbers import data_uri
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import option_tables
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from warpsplat.cli.help import GroupedCommand
 from warpsplat.cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
@@ -55,7 +56,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put tables of options where a page says ``<!-- options: NAME -->``."""
     return re.sub(
-        r"^<!-- options: (\w+) -->$", lambda m: option_tables.table(m[1]), markdown, flags=re.MULTILINE
+        r"^<!-- options: (\w+) -->$", lambda m: option_tables.tables(m[1]), markdown, flags=re.MULTILINE
     )
 
 
@@ -86,8 +87,18 @@ def command_help(name: str) -> Iterator[str]:
     yield f"## {name}\n"
     yield from paragraphs(inspect.cleandoc(command.help or ""))
     yield f"```text\n{command.get_usage(context).removeprefix('Usage: ')}\n```\n"
+    if isinstance(command, GroupedCommand):
+        for group, options in command.groups(context).items():
+            yield f"### {group}\n"
+            yield from option_table(context, options)
+    else:
+        yield from option_table(context, command.get_params(context))
+
+
+def option_table(context: click.Context, parameters: Iterable[click.Parameter]) -> Iterator[str]:
+    """Lines of a table of the options among the parameters of a command."""
     yield "| option | meaning | default |\n|---|---|---|"
-    for parameter in command.get_params(context):
+    for parameter in parameters:
         record = parameter.get_help_record(context)
         if record and isinstance(parameter, click.Option):
             yield option_row(*record)

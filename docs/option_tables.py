@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from warpsplat.fit.options import Option, options_of
+from warpsplat.fit.options import GROUPS, Option, options_of
 from warpsplat.fit.settings import Density, Settings, make_settings
 from warpsplat.run.options import OPTIONS
 
@@ -66,13 +66,18 @@ def annotation(option: Option) -> str:
     return f"{written} | str" if option.parse and written != "str" else written
 
 
-def table(name: str) -> str:
-    """Return a table in Markdown: of the ``options``, or of what is for ``research``."""
+def tables(name: str) -> str:
+    """Return tables in Markdown: of the ``options``, in groups, or of what is for ``research``."""
     if name == "options":
-        named = [(f"--{each.name} {each.metavar}".strip(), each) for each in OPTIONS]
-    else:
-        named = [(each.name, each) for each in options_of(Settings) if each.research]
-        named += [(f"density.{each.name}", each) for each in options_of(Density)]
+        flags = [(f"--{each.name} {each.metavar}".strip(), each) for each in OPTIONS]
+        grouped = [(group, [one for one in flags if one[1].group == group]) for group in GROUPS]
+        return "\n\n".join(f"### {group}\n\n{table(named)}" for group, named in grouped if named)
+    named = [(each.name, each) for each in options_of(Settings) if each.research]
+    return table([*named, *((f"density.{each.name}", each) for each in options_of(Density))])
+
+
+def table(named: list[tuple[str, Option]]) -> str:
+    """Return a table of options and what they are called."""
     lines = ["| option | values | meaning | default |", "|---|---|---|---|"]
     for called, each in named:
         values = each.accepts if each.choices or each.limits or each.wanted else ""

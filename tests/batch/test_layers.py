@@ -43,7 +43,7 @@ def test_the_command_line_is_stronger_than_the_job_than_the_preset_than_the_defa
 
 
 def test_flags_that_are_not_given_say_nothing(folder: Path) -> None:
-    given: dict[str, Any] = {"kind": Kind.STROKE, "target_psnr": None, "max_bytes": "9KB", "minify": True}
+    given: dict[str, Any] = {"open": True, "target_psnr": None, "max_bytes": "9KB", "minify": True}
     assert flags_of(given) == {"open": True, "target-psnr": None, "max-bytes": "9KB", "minify": True}
     assert command_layer({"curves": None}, ()) == {}
 

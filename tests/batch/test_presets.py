@@ -37,9 +37,9 @@ def test_those_for_machines_make_outlines_of_a_known_size(name: str, tmp_path: P
 
 
 def test_options_beside_a_preset_count_more() -> None:
-    settings = make_settings(**with_preset("brush", {"curves": 12, "kind": None, "quality": None}))
+    settings = make_settings(**with_preset("brush", {"curves": 12, "closed": None, "quality": None}))
     assert settings.curves == 12 and settings.kind == Kind.STROKE and settings.spline_points == 5
-    closed = make_settings(**with_preset("brush", {"kind": Kind.FILL}))
+    closed = make_settings(**with_preset("brush", {"closed": True}))
     assert closed.kind == Kind.FILL
 
 
@@ -52,6 +52,8 @@ def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixt
     own.write_text("shape: circle\ncurves: 99\ndensity: {surplus: 1}\n", "utf-8")
     assert run("vectorize", image, "-o", tmp_path / "b.svg", "--preset", own, *quick) == 0
     assert (tmp_path / "b.svg").read_text("utf-8").count("<circle") == 6
+    assert run("batch", image, "-o", tmp_path / "e.svg", "--preset", own, "--shape", "triangle", *quick) == 0
+    assert (tmp_path / "e.svg").read_text("utf-8").count("<polygon") == 6
     assert run("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick) == 2
     assert "known are: brush, embroidery" in one_line(capfd.readouterr().err)
     own.write_text("shape: circle\ncurve: 99\n", "utf-8")

@@ -159,15 +159,3 @@ def test_objects_keep_out_of_the_way_of_a_file(
     assert json_stream(["vectorize", "-", "--output=-", "--json"]) == "stderr"
     assert json_stream(["vectorize", "--", "--json"]) is None
     assert json_stream(["vectorize", "a", "--json", "--", "-o", "-"]) == "stdout"
-
-
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_source")
-    assert run() == 0
-    assert "_warpsplat_completion" in capsys.readouterr().out
-    monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_complete")
-    monkeypatch.setenv("COMP_WORDS", "warpsplat vectorize --qual")
-    monkeypatch.setenv("COMP_CWORD", "--qual" if shell == "fish" else "2")
-    assert run() == 0
-    assert "--quality" in capsys.readouterr().out

@@ -36,11 +36,11 @@ USAGE = [
     ],
     ("folder.svg", "folder.svg: is a folder; warpsplat batch folder.svg vectorizes its images"),
     ("nonsense", "no such command or file: nonsense; commands are vectorize, "),
-    ("vectorise photo.png", "no such command or file: vectorise; did you mean vectorize?"),
+    ("vectorise photo.png", "no such command or file: vectorise; did you mean 'vectorize'?"),
     ("drawing.svg", "drawing.svg: with which command? warpsplat render FILE.svg"),
     ("good.yaml", "good.yaml: with which command? warpsplat batch FILE.yaml"),
     ("--curves 5 photo.png", "(options follow a command: warpsplat vectorize IMAGE ...)"),
-    ("vectorize photo.png --curve 5", "--curves"),
+    ("vectorize photo.png --colours 5", "no such option: --colours; did you mean '--colors'?"),
     *[(f"{line} --nonsense", "--nonsense") for line in VALID.values()],
     *[(f"{VALID[name]} --device cuda:99", "cuda:99") for name in WITH_DEVICE],
     *[(line, "issing") for line in ("compare", "vectorize", "refine drawing.svg")],
@@ -49,18 +49,27 @@ USAGE = [
     ("vectorize photo.png --curves 0", "curves"),
     ("vectorize photo.png --curves many", "--curves"),
     ("vectorize photo.png --quality best", "--quality"),
-    ("vectorize photo.png --threads 0", "--threads"),
+    ("vectorize photo.png --subject foto", "did you mean 'photo'?"),
+    ("vectorize photo.png --shape rectangel", "did you mean 'rectangle'?"),
+    ("vectorize photo.png --threads 0", "'--threads': 0 is less than 1"),
+    ("serve --port 99999", "99999 is not between 0 and 65535"),
     ("vectorize photo.png --time-budget soon", "not a time"),
     ("vectorize photo.png --max-bytes -1", "not a size"),
     (f"vectorize photo.png --max-bytes {400 * '9'}", "not a size"),
     ("vectorize photo.png --target-psnr -3", "target-psnr"),
     ("vectorize photo.png --target-psnr nan", "target-psnr"),
-    ("vectorize missing.png --size 3", "not a size: '3'"),
+    ("vectorize missing.png --size mm", "not a size: 'mm'"),
+    *[
+        (f"{line} --open --closed", "closed")
+        for line in ("vectorize missing.png", "batch photo.png", "compare photo.png --against vtracer")
+    ],
     ("vectorize missing.png --page b5", "page must be one of"),
     ("vectorize missing.png --units ell", "units must be one of"),
     ("refine drawing.svg photo.png -o a.svg --iterations 0", "iterations"),
-    ("refine drawing.svg photo.png -o a.svg --background yellow", "background"),
+    ("refine drawing.svg photo.png -o a.svg --background yelow", "did you mean 'yellow'?"),
     ("vectorize ''", "the name of the file is empty"),
+    ("vectorize drawing.svg", "drawing.svg: is an SVG, not an image; refine improves SVGs"),
+    ("refine photo.png drawing.svg", "refine takes the SVG first, then the image"),
     ("eval drawing.svg photo.png", "eval takes the image first, then the SVG"),
     *[(f"vectorize photo.png {option} many", "is not a whole number") for option in ("--threads", "--seed")],
     *[(f"{VALID['render']} --scale {scale}", "scale") for scale in ("0", "-1", "nan", "1e9", "1e308")],
@@ -144,6 +153,7 @@ USAGE = [
 ]
 
 INPUT = [
+    ("render photo.png", "photo.png: not an SVG"),
     *[
         (line.replace("photo.png", name), name)
         for line in map(VALID.__getitem__, ("vectorize", "refine", "eval", "compare"))

@@ -105,12 +105,13 @@ def test_colours_of_a_palette_are_not_trained() -> None:
 
 
 def test_palettes_as_texts(tmp_path: Path) -> None:
-    assert parse_palette("#F00, #00ff00\n#f00") == ("#ff0000", "#00ff00")
-    for bad in ("red", "#12", "", "#ggg"):
+    assert parse_palette("#F00, lime\n#f00, Red") == ("#ff0000", "#00ff00")
+    for bad in ("rad", "#12", "", "#ggg"):
         with pytest.raises(UsageError, match="palette must be colours"):
             parse_palette(bad)
     file = tmp_path / "colors.txt"
     file.write_text("#fff\n#010203\n")
     assert settings_from({"palette": str(file)}).palette == ("#ffffff", "#010203")
+    assert settings_from({"palette": "black,white"}).palette == ("#000000", "#ffffff")
     with pytest.raises(UsageError, match="No such file"):
         settings_from({"palette": str(tmp_path / "none")})

@@ -64,8 +64,8 @@ def test_density_may_be_given_in_part() -> None:
         *(({"basis": bad}, "basis must be one of cubic, spline, not") for bad in ("quartic", 7)),
         ({"quality": "best"}, "quality must be one of draft, balanced, high, not 'best'"),
         (
-            {"background": "red"},
-            "background must be auto, none or a colour such as '#fff' (in quotes, ",
+            {"background": "rad"},
+            "background must be auto, none or a colour such as white or '#fff' (in quotes, ",
         ),
         ({"title": "x" * 1001}, "title must be a text of at most 1000 characters"),
         ({"rates": 3}, "rates must be a mapping"),
@@ -92,6 +92,7 @@ def test_density_may_be_given_in_part() -> None:
         ({"levels": "5,5"}, "levels must be ascending numbers of shapes"),
         ({"levels": "4,8", "curves": 9}, "curves 9 and the last of the levels"),
         ({"levels": "4,8", "max_bytes": "4KB"}, "levels and max-bytes"),
+        ({"subject": "photo", "bridges": "2"}, "subject photo and bridges 2 cannot be combined"),
         ({"size": "9x9mm", "page": "a4"}, "size and page cannot be combined"),
     ],
 )
@@ -116,7 +117,7 @@ def test_times_and_sizes() -> None:
                 parse(bad)
 
 
-@pytest.mark.parametrize("color", ["#fff", "#FFF", "#FFFFFF", " #ffffff"])
+@pytest.mark.parametrize("color", ["#fff", "#FFF", "#FFFFFF", " #ffffff", "White"])
 def test_one_reading_of_colours(color: str) -> None:
     assert make_settings(background=color).background == "#ffffff"
     assert make_settings(palette=color).palette == ("#ffffff",)

@@ -27,12 +27,12 @@ def test_flags_keys_keywords_and_rows(option: Option) -> None:
     assert option.value is not None or command.make_context("vectorize", ["a.png"]).params[flag.name] is None
     assert (flag.help or "").startswith(option.help)
     assert option.keyword in inspect.signature(warpsplat.vectorize).parameters
-    assert f"<code>--{option.name}" in MADE["table"]("options")
+    assert f"<code>--{option.name}" in MADE["tables"]("options")
 
 
 def test_what_is_made_is_current() -> None:
     assert MADE["TYPED"].read_text("utf-8") == MADE["typed_options"](), "python docs/option_tables.py"
-    rows = MADE["table"]("research")
+    rows = MADE["tables"]("research")
     assert all(
         f"| <code>{key}</code> |" in rows for key in (*RESEARCH_KEYS, "rates", "density", "density.stop")
     )

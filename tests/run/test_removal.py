@@ -74,6 +74,33 @@ def test_another_background() -> None:
     assert shown[0, 0].tolist() == shown[32, 20].tolist() == [0x88, 0xCC, 0xFF]
 
 
+@pytest.mark.parametrize(
+    "options", [{"background": "#8cf"}, {"stack": "cutout"}, {"background": "#8cf", "stack": "cutout"}]
+)
+def test_figures_are_those_on_the_background(options: dict[str, Any]) -> None:
+    image = drawn(RING, 64, 64)
+    plain, other = (made(image, "drawing", remove_background="everywhere", **o) for o in ({}, options))
+    assert abs(scored(other).psnr - scored(plain).psnr) < 1.5
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_a_palette_is_not_for_a_background_that_is_left_out(quality: str) -> None:
+    """White in black only would be black on black, whose edges could be anywhere."""
+    options = {"remove_background": "everywhere", "quality": quality}
+    plain, black = (made(drawn(RING, 64, 64), "drawing", **options, **o) for o in ({}, {"palette": "#000"}))
+    assert "#fff, was removed" in black.notes[-1]
+    assert (
+        np.abs(opacity(black) - opacity(plain)).mean() < 0.08
+    )  # 0.023 where edges fit other colours, 0.29 if any will do
+
+
+@pytest.mark.parametrize(("width", "noted"), [("2", False), ("40", True)])
+def test_bridges_that_are_wider_than_what_they_hold(width: str, noted: bool) -> None:
+    result = made(drawn(RING, 64, 64), "drawing", quality="draft", bridges=width)
+    assert any("left out, as stencils have none" in note for note in result.notes)
+    assert ("bridges are wider than 1 of the 1 part" in result.notes[-1]) == noted
+
+
 @pytest.mark.parametrize("removal", ["outside", "everywhere"])
 def test_pixel_art_is_exact(removal: str) -> None:
     cells = np.full((9, 11, 3), 255, np.uint8)

@@ -39,13 +39,19 @@ def test_sizes_and_pages() -> None:
     assert sheet_for("200x150mm", "", "", 1, 1) == Sheet(200, 150)
     assert sheet_for("20 x 15 cm", "", "", 1, 1) == Sheet(200, 150)
     assert sheet_for("8x6", "", "in", 1, 1) == Sheet(8 * 25.4, 6 * 25.4, unit="in")
+    assert sheet_for("200mm", "", "", 4, 3) == sheet_for("x150mm", "", "", 4, 3) == Sheet(200, 150)
     assert sheet_for("", "A4", "", 100, 200) == Sheet(210, 297, 10)
     assert sheet_for("", "a4", "cm", 200, 100) == Sheet(297, 210, 10, "cm")
 
 
 @pytest.mark.parametrize(
     ("size", "page", "unit", "named"),
-    [("200", "", "mm", "200x150mm"), ("0x10mm", "", "", "0x10mm"), ("99999x10mm", "", "", "99999x10mm")]
+    [
+        ("mm", "", "mm", "200x150mm"),
+        ("4x3x", "", "", "4x3x"),
+        ("0x10mm", "", "", "0x10mm"),
+        ("99999x10mm", "", "", "99999x10mm"),
+    ]
     + [("1x1", "", "ell", "ell"), ("", "b9", "", "b9")],
 )
 def test_invalid_options_are_named(size: str, page: str, unit: str, named: str) -> None:

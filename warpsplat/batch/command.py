@@ -14,9 +14,10 @@ import click
 
 from warpsplat.batch.options import BatchOptions, batch_options
 from warpsplat.cli.echo import echo
+from warpsplat.cli.help import GroupedCommand
 from warpsplat.errors import ExitCode, UsageError
 from warpsplat.files.inputs import STANDARD
-from warpsplat.run.options import KINDS
+from warpsplat.run.options import with_preset
 
 if TYPE_CHECKING:
     from warpsplat.batch.executors.tasks import Executor
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     from warpsplat.cli.signals import Interrupt
 
 
-@click.command("batch", context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("inputs", nargs=-1, required=True, metavar="INPUT...")
+@click.command("batch", cls=GroupedCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("inputs", type=click.Path(readable=False), nargs=-1, required=True, metavar="INPUT...")
 @batch_options
 def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **given: Any) -> None:
     """Vectorize many images: INPUT is an image, a folder, a pattern or a YAML file.
@@ -48,6 +49,7 @@ def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **give
     Its paths are relative to it. What the command line says is stronger.
     """  # noqa: D301
     options = {each.name: given.pop(each.name) for each in fields(BatchOptions) if each.name in given}
+    given = with_preset(given.pop("preset"), given)
     perform(inputs, flags_of(given), sets, BatchOptions(**options))
 
 
@@ -86,12 +88,10 @@ def vectorize_images(
 
 def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return flags of settings as keys of batch files."""
-    flags = {
+    return {
         key.replace("_", "-"): str(value) if isinstance(value, Path) else value
         for key, value in given.items()
-        if key != "kind"
     }
-    return flags | {name: True for name, kind in KINDS.items() if given.get("kind") == kind}
 
 
 def perform(

@@ -10,6 +10,7 @@ EXTENSION = Extension(
     },
     provides={
         "vectorize_images": "warpsplat.batch.command:vectorize_images",
+        "preset_names": "warpsplat.batch.presets:preset_names",
         "with_preset": "warpsplat.batch.presets:with_preset",
     },
     api={"load_preset": "warpsplat.batch.presets"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
 from warpsplat.fit.options import nearest
 from warpsplat.run.names import ErrorAt
+from warpsplat.run.options import BY_NAME, RESEARCH_KEYS
 
 MAX_FILE = 1 << 20
 """Largest batch file [bytes]: a mebibyte of YAML takes seconds to read."""
@@ -69,13 +70,13 @@ class BatchFile:
         """Return key -> (line, value node); unknown and repeated keys are errors."""
         if not isinstance(node, yaml.MappingNode):
             line = node.start_mark.line + 1 if node else 1
-            raise self.error(line, f"{where} must be a mapping with keys out of: {', '.join(allowed)}")
+            raise self.error(line, f"{where} must be a mapping, whose keys may be {_listed(allowed)}")
         result: dict[str, tuple[int, yaml.Node]] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
-                hint = nearest(key, allowed) or f"; known are: {', '.join(allowed)}"
+                hint = nearest(key, allowed) or f"; known are {_listed(allowed)}"
                 raise self.error(line, f"unknown key {shown(key)} in {where}{hint}")
             if key in result:
                 raise self.error(line, f"key {shown(key)} is there twice in {where}")
@@ -98,6 +99,13 @@ class BatchFile:
         if "\0" in value or any("\ud800" <= c <= "\udfff" for c in value):
             raise self.error(line, f"{key}: {shown(value)} holds a character that no name can have")
         return value
+
+
+def _listed(keys: Iterable[str]) -> str:
+    """Return keys in words; those of options are too many to be listed."""
+    words = ", ".join(key for key in keys if key not in BY_NAME and key not in RESEARCH_KEYS)
+    options = "the options of vectorize (see warpsplat vectorize --help-all)"
+    return " and ".join(filter(None, (words, options if BY_NAME.keys() & {*keys} else "")))
 
 
 def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:

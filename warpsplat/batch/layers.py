@@ -22,6 +22,11 @@ from warpsplat.run.options import BY_NAME, KINDS, NESTED, RESEARCH_KEYS, setting
 
 TEXT_KEYS = ("output", "device", "importance")
 KEYS = (*BY_NAME, *TEXT_KEYS, *RESEARCH_KEYS, *NESTED)
+SINGLE_KEYS = (
+    *(key for key in KEYS if key not in NESTED),
+    *(f"{outer}.{k}" for outer in NESTED for k in NESTED[outer]),
+)
+"""Keys of single values, as ``--set`` has them."""
 
 MATRIX = "matrix"
 """Key of lists of values: a job is done with each combination of them."""
@@ -104,7 +109,8 @@ def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
         elif key not in TEXT_KEYS:  # they are texts already
             settings_from({key.replace("-", "_"): value})
     except (UsageError, TypeError) as error:
-        raise error_at(f"{name}: {error}") from error
+        said = str(error)
+        raise error_at(said if said.startswith(f"{name} ") else f"{name}: {said}") from error
 
 
 def _check_kinds(layer: Layer) -> None:
@@ -122,9 +128,8 @@ def assigned(text: str) -> tuple[str, Any]:
     key, dot, inner = name.partition(".")
     if not found:
         raise UsageError(f"--set {cut(text)}: must be KEY=VALUE")
-    if key not in KEYS or bool(dot) != (key in NESTED) or (dot and inner not in NESTED[key]):
-        known = [*KEYS, *(f"{outer}.{inner}" for outer in NESTED for inner in NESTED[outer])]
-        hint = nearest(name, known) or "; the keys are those of batch files"
+    if name not in SINGLE_KEYS:
+        hint = nearest(name, SINGLE_KEYS) or "; the keys are those of batch files"
         raise UsageError(f"--set {cut(text)}: unknown key {shown(name)}{hint}")
     try:
         value = written if key in TEXT_KEYS else plain(written)

@@ -44,16 +44,13 @@ def preset_layer(preset: str) -> Layer:
 
 def load_preset(preset: str) -> dict[str, Any]:
     """Return the settings of a preset as keywords of ``make_settings``; see ``preset_layer``."""
-    values = {key.replace("-", "_"): item.value for key, item in preset_layer(preset).items()}
-    for name, kind in KINDS.items():
-        if values.pop(name, False):
-            values["kind"] = kind
-    return values
+    return {key.replace("-", "_"): item.value for key, item in preset_layer(preset).items()}
 
 
 def with_preset(preset: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the options ``given``, None being left out, over those of a preset."""
     values = load_preset(preset)
-    if given.get("quality") is not None:
-        values.pop("iterations", None)
+    stronger = {"quality": {"iterations"}, **{kind: {*KINDS} for kind in KINDS}}
+    for name in [name for name in stronger if given.get(name) is not None]:
+        values = {key: value for key, value in values.items() if key not in stronger[name]}
     return {**given, **{name: value for name, value in values.items() if given.get(name) is None}}

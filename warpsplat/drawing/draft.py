@@ -93,9 +93,10 @@ def as_fit(scene: Scene, per_pixel: float, problem: Problem, run: Run) -> Fit:
 
 
 def limited(scene: Scene, settings: Settings) -> Scene:
-    """Return ``scene`` in the colours that the settings allow."""
+    """Return ``scene`` in the colours that the settings allow, but for a background that is left out."""
     if not settings.is_limited:
         return scene
     scene = scene.take(solid_shapes(scene))
     palette = Palette.of_scene(settings, scene)
-    return palette.limited(scene) if palette else scene
+    made = palette.limited(scene) if palette else scene
+    return replace(made, canvas=scene.canvas) if settings.removal or settings.bridges else made

@@ -182,7 +182,9 @@ def _errors_as(kind: type[WarpsplatError], path: Path, verb: str) -> Iterator[No
     name = printable(str(path))
     try:
         yield
-    except FileNotFoundError:
+    except FileNotFoundError as error:
+        if isinstance(error.__cause__, OSError):  # that no server answers is no such file to fsspec
+            raise kind(f"{name}: {verb}: {_cause(error.__cause__)}") from error
         raise kind(f"{name}: no such file") from None
     except Exception as error:
         raise kind(f"{name}: {verb}: {_cause(error)}") from error

@@ -32,6 +32,12 @@ MAX_DIGITS = 15
 
 COLOR = re.compile(r"#([0-9a-f]{3}|[0-9a-f]{6})", re.IGNORECASE)
 
+COLOR_NAMES = (
+    *("aqua", "black", "blue", "fuchsia", "gray", "green", "lime", "maroon"),
+    *("navy", "olive", "purple", "red", "silver", "teal", "white", "yellow"),
+)
+"""Names of colours that are suggested; all of CSS are known."""
+
 QUOTED = "in quotes, as an unquoted # begins a comment"
 """How shells and YAML files want colours, for messages."""
 
@@ -40,6 +46,25 @@ Elsewhere = Literal["refused", "ignored", "fitted"]
 """Consequences of an option that has no effect on a subject. If the user gave the subject, it is an error, or
 the option is ignored with a note. If the subject was detected the option is ignored as well, unless it asks
 for fitted shapes: then the image is fitted as a photograph, and a note says so."""
+
+
+Group = Literal[
+    "Batch",
+    "What to make",
+    "Shapes",
+    "Colours",
+    "Goals and limits",
+    "Fitting",
+    "Drawings",
+    "Size on paper",
+    "Cutters and plotters",
+    "Contents of the SVG",
+    "Files",
+    "Run",
+]
+"""Groups of options in help and documentation, in their order."""
+
+GROUPS: tuple[Group, ...] = get_args(Group)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +78,14 @@ class Option:
     default: Any = None
     shown_default: str | None = None  # the default as help shows it, if not as it is
     help: str = ""  # empty if it cannot be given by this name
+    group: Group | None = None  # of one that has a flag
+    common: bool = False  # whether it is one of those that most people need
     research: bool = False  # a key of batch files and a keyword of make_settings, but no flag
     refine: bool = False  # whether refine takes it as well
     limits: tuple[float, float] | None = None  # of a number, else positive; of the length of a text
     choices: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()  # values with names, of an option that takes others as well
+    files: bool = False  # whether a value may be the name of a file
     pattern: str = ".*"  # regular expression for a text, which "wanted" describes
     wanted: str = ""  # values that are accepted, in words
     metavar: str = ""
@@ -110,7 +139,8 @@ class Option:
             for key, inner in value.items():
                 number.check(inner, f"{prefix}{self.name} {key}")
         elif not (self._accepted(value) or (value is None and self.default is None)):
-            raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}")
+            meant = nearest(value, self.choices or self.values) if isinstance(value, str) else ""
+            raise UsageError(f"{prefix}{self.name} must be {self.accepts}, not {shown(value)}{meant}")
 
     def _accepted(self, value: Any) -> bool:
         if self.choices:
@@ -162,7 +192,10 @@ def options_of(declaring: type) -> tuple[Option, ...]:
             type=get_origin(kind) or kind,
             choices=choices or declared.choices,
             metavar=declared.metavar or ("N" if kind is int and not declared.parse else ""),
-            shorthands=tuple(dataclasses.replace(s, field=field.name) for s in declared.shorthands),
+            shorthands=tuple(
+                dataclasses.replace(s, field=field.name, group=s.group or declared.group)
+                for s in declared.shorthands
+            ),
         )
         found.append(made)
     return tuple(found)
@@ -175,10 +208,15 @@ def limits_of(declaring: type, name: str) -> tuple[float, float]:
     return found
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'colors'?"`` for a name like one of the ``known``, else nothing."""
-    found = difflib.get_close_matches(name, [*known], 1)
-    return f"; did you mean {found[0]!r}?" if found else ""
+def nearest(name: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return ``"; did you mean 'colors'?"`` for a name like one of the ``known``, else nothing.
+
+    ``prefix``: what all of them begin with, such as dashes; it says nothing about likeness.
+    """
+    found = difflib.get_close_matches(
+        name.removeprefix(prefix), [each.removeprefix(prefix) for each in known], 1
+    )
+    return f"; did you mean {prefix + found[0]!r}?" if found else ""
 
 
 def _words(value: object) -> str:
@@ -219,10 +257,13 @@ def parse_levels(value: object) -> tuple[int, ...]:
 
 
 def color_of(text: str) -> str | None:
-    """Return ``#F80`` or ``#ff8800`` as ``#ff8800``; None for anything else."""
+    """Return ``#F80``, ``#ff8800`` or the name of a CSS colour as ``#ff8800``; None for anything else."""
     found = COLOR.fullmatch(text)
     if not found:
-        return None
+        from PIL import ImageColor  # not for help
+
+        is_name = text.lower() in ImageColor.colormap
+        return "#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(text)) if is_name else None
     digits = found[1].lower()
     return "#" + (digits if len(digits) == 6 else "".join(2 * digit for digit in digits))
 
@@ -233,7 +274,7 @@ def parse_background(value: object) -> object:
 
 
 def parse_palette(value: object) -> tuple[str, ...]:
-    """Return ``#f00,#00ff00``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
+    """Return ``#f00,lime``, or a list, as ``("#ff0000", "#00ff00")``: each once, in order.
 
     Raises ``UsageError`` for anything else.
     """
@@ -242,6 +283,6 @@ def parse_palette(value: object) -> tuple[str, ...]:
     for part in parts:
         color = color_of(_words(part))
         if color is None:
-            raise UsageError(f"palette must be colours such as '#ff8800,#fff' ({QUOTED}), not {shown(part)}")
+            raise UsageError(f"palette must be colours such as '#ff8800,white' ({QUOTED}), not {shown(part)}")
         colors[color] = None
     return tuple(colors)

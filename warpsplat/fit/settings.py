@@ -16,6 +16,7 @@ from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.field_docs import described
 from warpsplat.fit.options import (
     COLOR,
+    COLOR_NAMES,
     QUOTED,
     Option,
     color_of,
@@ -196,19 +197,30 @@ class Settings:
         shown_default="512; fewer for a simple image",
         subjects=("photo", "drawing"),
         elsewhere="ignored",
+        group="Shapes",
+        common=True,
     )
     subject: Subject = option(
         "auto",
         "Kind of image: photos are fitted with shapes, the other kinds are traced; silhouette: outlines of"
-        " objects photographed on plain ground.",
+        " objects photographed on a plain ground.",
+        group="What to make",
+        common=True,
     )
     kind: Kind = option(
         Kind.FILL,
         **FITTED,
         shorthands=(
             Option(name="closed", type=bool, help="Filled shapes.", shown_default="yes", value=Kind.FILL),
-            Option(name="open", type=bool, help="Strokes.", value=Kind.STROKE),
+            Option(
+                name="open",
+                type=bool,
+                help="Strokes instead of filled shapes.",
+                value=Kind.STROKE,
+                common=True,
+            ),
         ),
+        group="Shapes",
     )
     shape: str = option(
         CURVE,
@@ -217,13 +229,17 @@ class Settings:
         pattern=f"{CURVE}|{'|'.join(FORMS)}|polygon:({POLYGON_CORNERS})",
         wanted=f"one of {', '.join((CURVE, *FORMS))}, or polygon:N with 3 to 64 corners",
         metavar="FORM",
+        values=tuple(FORMS),
         **FITTED,
+        group="Shapes",
+        common=True,
     )
     mixed: bool = option(
         False,
         "Fills and strokes together, whichever suits better; in line art, fills for filled areas.",
         subjects=("photo", "line"),
         elsewhere="fitted",
+        group="Shapes",
     )
     iterations: int = option(
         1000,
@@ -234,15 +250,22 @@ class Settings:
         elsewhere="ignored",
         shorthands=(
             Option(
-                name="quality", help="Effort: how many steps.", default=DEFAULT_QUALITY, choices=QUALITIES
+                name="quality",
+                help="Effort: how many steps.",
+                default=DEFAULT_QUALITY,
+                choices=QUALITIES,
+                group="What to make",
+                common=True,
             ),
         ),
+        group="Fitting",
     )
     renderer: str = option(
         "exact",
         "How a fit renders shapes: as viewers do, as Gaussians close to that, or as the paper's soft ones.",
         **FITTED,
         choices=renderer_names(),
+        group="Fitting",
     )
     paint: Painting | None = option(
         None,
@@ -250,12 +273,14 @@ class Settings:
         shown_default="flat for photos, auto for drawings",
         subjects=("photo", "drawing"),
         elsewhere="ignored",
+        group="Colours",
     )
     loss: LossName = option(
         "l2",
         "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
         subjects=("photo",),
         refine=True,
+        group="Fitting",
     )
     levels: tuple[int, ...] = option(
         (),
@@ -270,17 +295,31 @@ class Settings:
                 help="Levels from coarse to fine, as groups; those up to any one form a complete picture.",
             ),
         ),
+        group="Shapes",
     )
-    colors: int | None = option(None, "At most N colours; the shapes are then opaque.", (1, MOST_COLOR_COUNT))
+    colors: int | None = option(
+        None,
+        "At most N colours; the shapes are then opaque.",
+        (1, MOST_COLOR_COUNT),
+        group="Colours",
+        common=True,
+    )
     palette: tuple[str, ...] = option(
         (),
-        "The only colours, as '#f80,#fff' in quotes, or a file of them.",
+        "The only colours, as '#f80,white' in quotes, or a file of them.",
         metavar="COLORS",
+        values=COLOR_NAMES,
+        files=True,
         parse=parse_palette,
+        group="Colours",
     )
-    opaque: bool = option(False, "No translucent shapes.", **TUNING)
+    opaque: bool = option(False, "No translucent shapes.", **TUNING, group="Colours")
     target_psnr: float | None = option(
-        None, "Make the smallest file with a PSNR of at least DB.", **FITTED, metavar="DB"
+        None,
+        "Make the smallest file with a PSNR of at least DB.",
+        **FITTED,
+        metavar="DB",
+        group="Goals and limits",
     )
     time_budget: float | None = option(
         None,
@@ -288,6 +327,7 @@ class Settings:
         metavar="TIME",
         parse=parse_duration,
         refine=True,
+        group="Goals and limits",
     )
     max_bytes: int | None = option(
         None,
@@ -296,41 +336,76 @@ class Settings:
         elsewhere="fitted",
         metavar="SIZE",
         parse=parse_bytes,
+        group="Goals and limits",
+        common=True,
     )
     max_memory: int | None = option(
         None,
         "Memory limit, such as 4GB; an image that needs more is processed at a reduced size.",
         metavar="SIZE",
         parse=parse_bytes,
+        group="Goals and limits",
     )
-    detail: float = option(0.5, "Of drawings: from 0, few big shapes, to 1, every speck.", FRACTION, **DRAWN)
+    detail: float = option(
+        0.5,
+        "For drawings: from 0, few big shapes, to 1, every speck.",
+        FRACTION,
+        **DRAWN,
+        group="Drawings",
+        common=True,
+    )
     optics: OpticsChoice = option(
         "auto",
-        "Whether a drawing is what it was before a scan, a filter or resizing changed its edges.",
+        "auto: undo what a scan, a filter or resizing did to the edges of a drawing.",
         **DRAWN,
+        group="Drawings",
     )
-    seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
+    seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING, group="Fitting")
     background: str = option(
         "auto",
-        "auto (transparent where the image is), none, or a colour such as '#fff', in quotes.",
+        "auto (transparent where the image is), none, or a colour: white, or '#fff' in quotes.",
         pattern=f"auto|none|(?i:{COLOR.pattern})",
-        wanted=f"auto, none or a colour such as '#fff' ({QUOTED})",
+        wanted=f"auto, none or a colour such as white or '#fff' ({QUOTED})",
         metavar="COLOR",
+        values=("auto", "none", *COLOR_NAMES),
         parse=parse_background,
         refine=True,
+        group="Colours",
+        common=True,
     )
     remove_background: Removal | None = option(
         None,
         "Leave out the colour of the border: from there inwards, as --background none does, or also in holes,"
         " such as those of letters.",
+        group="Colours",
     )
-    title: str = option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
-    size: str = option("", "For plotters: size of the picture, such as 200x150mm.", metavar="WxH")
-    page: str = option("", "For plotters: paper size, with margins: a3, a4, a5, letter.", metavar="NAME")
+    title: str = option(
+        "",
+        "Title of the picture, in the file.",
+        (0, 1000),
+        metavar="TEXT",
+        refine=True,
+        group="Contents of the SVG",
+    )
+    size: str = option(
+        "",
+        "Size of the picture, such as 200x150mm; or one side, as in 200mm, x150mm.",
+        metavar="WxH",
+        group="Size on paper",
+    )
+    page: str = option(
+        "",
+        "Sheet of paper, with margins: a3, a4, a5, letter.",
+        metavar="NAME",
+        values=("a3", "a4", "a5", "letter"),
+        group="Size on paper",
+    )
     units: str = option(
         "",
         "Unit of the size in the file, which follows from the image's resolution: mm, cm, in, pt; or px.",
         metavar="UNIT",
+        values=("mm", "cm", "in", "pt", "px"),
+        group="Size on paper",
     )
     dpi: float | None = option(
         None,
@@ -338,31 +413,46 @@ class Settings:
         (1, 1e6),
         shown_default="that in the image file, else 96",
         metavar="N",
+        group="Size on paper",
     )
     dxf: DxfCurves = option(
         "arcs",
         "Curves in a .dxf: arcs; splines; lines, for OpenSCAD; r12: lines, for old programs.",
         refine=True,
+        group="Cutters and plotters",
     )
     width: str = option(
         "",
-        "Of line art: one width for all strokes, in pixels or, such as 0.3mm, on the sheet.",
+        "For line art: one width for all strokes, in pixels or, such as 0.3mm, on the sheet.",
         metavar="N",
         parse=str,
         subjects=("line",),
         elsewhere="ignored",
+        group="Cutters and plotters",
     )
     ids: bool = option(
-        False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
+        False,
+        "Name paths after their colours, and group neighbouring paths of one colour.",
+        refine=True,
+        group="Contents of the SVG",
     )
     simple: bool = option(
-        False, "Outlines of fills that do not cross themselves, as those of drawings.", refine=True
+        False,
+        "Outlines of fills that do not cross themselves, as those of drawings.",
+        refine=True,
+        group="Cutters and plotters",
     )
-    separate: bool = option(False, "A path for each connected part of a colour, with its holes.", refine=True)
+    separate: bool = option(
+        False,
+        "A path for each connected part of a colour, with its holes.",
+        refine=True,
+        group="Cutters and plotters",
+    )
     stack: Stack = option(
         "overlap",
-        "Whether shapes lie on one another, or each is cut where others cover it; photos are opaque then.",
+        "Whether shapes overlap, or each is cut where others cover it; photos are opaque then.",
         refine=True,
+        group="Cutters and plotters",
     )
     bridges: str = option(
         "",
@@ -370,18 +460,25 @@ class Settings:
         metavar="N",
         parse=str,
         subjects=("drawing",),
-        elsewhere="ignored",
+        group="Cutters and plotters",
     )
     symbols: bool = option(
-        False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
+        False,
+        "Write equal outlines once, as symbols; nearly equal ones become equal.",
+        subjects=("drawing",),
+        group="Drawings",
     )
     strokes: bool = option(
         False,
-        "In drawings, lines of even width with round ends become strokes; drafts have none.",
+        "Lines of even width with round ends become strokes, but not in drafts.",
         **DRAWN,
+        group="Drawings",
     )
     minify: bool = option(
-        False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
+        False,
+        "Write the shortest text, without line breaks and without the mark of warpsplat.",
+        refine=True,
+        group="Contents of the SVG",
     )
     precision: int | None = option(
         None,
@@ -389,6 +486,7 @@ class Settings:
         (0, 6),
         shown_default="auto",
         refine=True,
+        group="Contents of the SVG",
     )
     simplify: bool = option(False)
     basis: Basis = research(
@@ -624,7 +722,7 @@ def expand(given: dict[str, Any]) -> None:
     """Replace shorthands among the ``given`` options by what they stand for, and add what options require."""
     closed, is_open = given.pop("closed", None), given.pop("open", None)
     if closed and is_open:
-        raise UsageError("closed and open cannot be combined")
+        raise UsageError("closed and open cannot be combined; mixed has both fills and strokes")
     if closed or is_open or closed is False:
         given["kind"] = Kind.FILL if closed else Kind.STROKE
     if given.get("shape") == LINE:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, RunHook
 from warpsplat.cli.options import OUTPUT
 from warpsplat.errors import UsageError
@@ -28,25 +29,29 @@ class MotionHook(RunHook):
     """Records a run for an animation, and shows it in the terminal."""
 
     options = {  # noqa: RUF012
-        "animate": click.option(
+        "animate": option_in(
+            "Files",
             "--animate",
             type=OUTPUT,
             metavar="FILE",
             help="Also write an animation: .svg, .gif, .webp or .mp4.",
         ),
-        "animate_what": click.option(
+        "animate_what": option_in(
+            "Files",
             "--animate-what",
             type=click.Choice(["training", "drawing"]),
             help="How the shapes were optimised, or how they are drawn one after the other."
             "  [default: training; drawing for traced images]",
         ),
-        "animate_width": click.option(
+        "animate_width": option_in(
+            "Files",
             "--animate-width",
             type=int,
             metavar="PX",
             help="Width of a .gif, .webp or .mp4.  [default: the image's; at most 800, of a GIF 480]",
         ),
-        "preview": click.option(
+        "preview": option_in(
+            "Run",
             "--preview",
             type=click.Choice(PROTOCOLS),
             help="Show the picture in the terminal (stderr), live during the run, by its best protocol;"

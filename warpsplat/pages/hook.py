@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import click
-
+from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, RunHook
 from warpsplat.cli.options import OUTPUT
 from warpsplat.errors import UsageError
@@ -22,8 +21,10 @@ class ReportHook(RunHook):
     commands = ("vectorize", "refine", "eval")
     modes = ("one file", "several images", "several numbers")
     options = {  # noqa: RUF012 - declared in the base class
-        "report": click.option(
+        "report": option_in(
+            "Files",
             "--report",
+            common=True,
             type=OUTPUT,
             metavar="FILE.html",
             help="Page on the result: image and SVG under a slider, error map, shapes, figures.",

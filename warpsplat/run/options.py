@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from warpsplat.errors import UsageError, printable
 from warpsplat.extensions import declared, load
-from warpsplat.fit.options import QUOTED, Option, options_of
+from warpsplat.fit.options import QUOTED, Option, options_of, parse_palette
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
 from warpsplat.scene import Kind
 
@@ -48,8 +48,14 @@ def read_palette(path: Path) -> str:
         if isinstance(error, UnicodeEncodeError) or "\0" in str(path):
             cause = "contains a character that file names cannot have"
         raise UsageError(
-            f"palette {printable(str(path))}: {cause}; colours begin with #, {QUOTED}"
+            f"palette {printable(str(path))}: {cause}; colours are names, or such as '#f80' {QUOTED}"
         ) from error
+
+
+def preset_names() -> Sequence[str]:
+    """Return the names of all presets."""
+    target = declared("provides").get("preset_names")
+    return load(target)() if target else ()
 
 
 def with_preset(preset: str | None, given: dict[str, Any]) -> dict[str, Any]:
@@ -70,5 +76,8 @@ def settings_from(given: Mapping[str, Any]) -> Settings:
     """Return ``make_settings`` of keywords in which a palette may be the name of a file."""
     palette = given.get("palette")
     if isinstance(palette, str) and palette.strip() and "#" not in palette:
-        given = {**given, "palette": read_palette(Path(palette))}
+        try:
+            parse_palette(palette)  # names of colours
+        except UsageError:
+            given = {**given, "palette": read_palette(Path(palette))}
     return make_settings(**given)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from warpsplat.errors import counted
 from warpsplat.fit.export import finished, for_machines
 from warpsplat.fit.settings import Settings
 from warpsplat.run.prepare import PreparedImage
-from warpsplat.scene import Scene
+from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene.bridges import hole_widths
 from warpsplat.scene.geometry import most_seen
 from warpsplat.svg.page import (
     MILLIMETRES,
@@ -19,6 +21,7 @@ from warpsplat.svg.page import (
     sheet_for,
     with_own_size,
 )
+from warpsplat.svg.write import on_background
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,25 @@ def _pixels(image: PreparedImage, name: str) -> str:
     if unit:
         length *= MILLIMETRES[unit] * paper_for(image, settings).sheet.scale(*image.size)
     return f"{length:.9g}"
+
+
+def on_removed(svg: str, scene: Scene, settings: Settings, per_pixel: float, background: FloatArray) -> str:
+    """Return the SVG of ``export_within`` on the background that was removed, sRGB in [0, 1], shape (3,)."""
+    if scene.canvas.background is not None:  # another one, which machines may have as a path
+        bare = replace(scene, canvas=replace(scene.canvas, background=None))
+        svg = finished(for_machines(bare, settings, per_pixel), settings, per_pixel)
+    return on_background(svg, background)
+
+
+def bridge_notes(scene: Scene, settings: Settings, per_pixel: float) -> tuple[str, ...]:
+    """Return the note that bridges are too wide for what they hold, if they are."""
+    if not settings.bridges:
+        return ()
+    cut = for_machines(scene, replace(settings, bridges="", separate=False), per_pixel)
+    holes, width = hole_widths(cut, per_pixel), float(settings.bridges)
+    narrow = sum(each < width for each in holes)
+    held = f"{narrow} of the {counted(len(holes), 'part')} that they hold"
+    return (f"bridges are wider than {held}; narrower ones leave more of the picture",) if narrow else ()
 
 
 def export_within(

@@ -23,16 +23,15 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
-from warpsplat.run.paper import export_within, paper_for, with_pixels
+from warpsplat.run.paper import bridge_notes, export_within, on_removed, paper_for, with_pixels
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
-from warpsplat.scene import Scene
+from warpsplat.scene import FloatArray
 from warpsplat.svg.numbers import hex_colors
-from warpsplat.svg.write import on_background
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -163,14 +162,14 @@ def make_result(
         metadata = STOPPED if made.interrupted else problem.metadata
         paper = paper_for(image, settings)
         shown, notes, background = made.scene, image.notes, made.scene.canvas.background
-        is_removed = strategy.traces and problem.removes_background
+        is_removed = strategy.traces and (problem.removes_background or bool(settings.bridges))
         if is_removed:
-            notes += (removal_note(shown, settings),)
+            notes += removal_notes(background, settings)
             shown = replace(shown, canvas=replace(shown.canvas, background=solid_color(settings.background)))
         svg, scene = export_within(shown, settings, made.per_pixel, metadata, paper)
         file = paper(svg)
         if is_removed and background is not None:  # figures are those on it
-            svg = on_background(svg, background, shown.canvas.background)
+            svg = on_removed(svg, scene, settings, made.per_pixel, background)
         if write:
             write(file)
         score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
@@ -195,7 +194,12 @@ def make_result(
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=(*notes, *([optics.words()] if optics else []), *paper.notes()),
+            notes=(
+                *notes,
+                *([optics.words()] if optics else []),
+                *paper.notes(),
+                *bridge_notes(scene, settings, made.per_pixel),
+            ),
             optics=optics,
             history=tuple(history),
         )
@@ -234,9 +238,11 @@ def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
         return arranged(replace(made, interrupted=True), problem, strategy, run)
 
 
-def removal_note(scene: Scene, settings: Settings) -> str:
-    """Return the note that the background of a scene was removed."""
-    color = scene.canvas.background
+def removal_notes(color: FloatArray | None, settings: Settings) -> tuple[str, ...]:
+    """Return the note that a background, sRGB in [0, 1], shape (3,), was removed."""
+    if color is None and not settings.removal:
+        return ()
     named = "" if color is None else f", {hex_colors(color[None])[0]},"
-    where = "from the border inwards" if settings.removal == "outside" else "everywhere"
-    return f"the background{named} was removed {where}; the figures are those of the file on it"
+    what = {"outside": "removed from the border inwards", "everywhere": "removed everywhere"}
+    done = what[settings.removal] if settings.removal else "left out, as stencils have none"
+    return (f"the background{named} was {done}; the figures are those of the file on it",)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from warpsplat.portable import elementary
@@ -32,18 +34,30 @@ def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
         per_pixel: As for ``simple``.
         width: Of a bridge [px].
     """
-    least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
+    least = LEAST * per_pixel * per_pixel
+    made: dict[int, list[Floats]] = {shape: [] for shape in free_fills(scene)}
+    for shape, outer, holes in _parts(scene, per_pixel):
+        left = [outer, *holes]
+        for hole in holes:
+            for bridge in _bridges(polygon(hole), polygon(outer), width * per_pixel):
+                left = difference(left, [bridge], least)
+        made[shape] += left
+    return with_rings(scene, made, per_pixel)
+
+
+def hole_widths(scene: Scene, per_pixel: float) -> list[float]:
+    """Return the smaller side of the box around each hole in the fills [px]."""
+    boxes = [np.ptp(polygon(hole), axis=0) for *_, holes in _parts(scene, per_pixel) for hole in holes]
+    return [float(box.min()) / per_pixel for box in boxes]
+
+
+def _parts(scene: Scene, per_pixel: float) -> Iterator[tuple[int, Floats, list[Floats]]]:
+    """Yield each connected part of the fills: the shape that it is of, its outer ring, its holes."""
+    least = LEAST * per_pixel * per_pixel
     for shape in free_fills(scene):
         painted = PAINTED[Rule(scene.rule[shape])]
-        rings = merged(rings_of(scene, shape, per_pixel), painted, least)
-        made[shape] = []
-        for outer, *holes in parts_of(rings):
-            left = [outer, *holes]
-            for hole in holes:
-                for bridge in _bridges(polygon(hole), polygon(outer), width * per_pixel):
-                    left = difference(left, [bridge], least)
-            made[shape] += left
-    return with_rings(scene, made, per_pixel)
+        for outer, *holes in parts_of(merged(rings_of(scene, shape, per_pixel), painted, least)):
+            yield shape, outer, holes
 
 
 def _bridges(hole: Floats, outer: Floats, width: float) -> list[Floats]:

@@ -45,7 +45,10 @@ OUR_VIEW = re.compile(f"{VIEW.pattern}>{MARK}")
 LENGTH = re.compile(r"(\d+(?:\.\d+)?)\s*(mm|cm|in|pt)?", re.IGNORECASE)
 """A length in pixels, or on the sheet."""
 
-SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)\s*(mm|cm|in|pt|px)?", re.IGNORECASE)
+SIZE = re.compile(
+    r"(?=.*\d)(\d+(?:\.\d+)?)?\s*(?:[x×]\s*(\d+(?:\.\d+)?))?\s*(mm|cm|in|pt|px)?", re.IGNORECASE
+)
+"""A width, a height after an x, or both; and a unit."""
 
 DECIMALS = 3
 """Decimals of boxes."""
@@ -82,7 +85,8 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
     """Return the sheet that options ask for.
 
     Args:
-        size: A size such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Empty: none.
+        size: A size such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Of a width alone, as in
+            ``200mm``, or a height, ``x150mm``, the other side follows. Empty: none.
         page: A standard format, with margins, in landscape for a picture wider than high. Empty: none.
         unit: Unit of the size in the file; empty: millimetres.
         width: Width of the picture.
@@ -99,12 +103,15 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
         return Sheet(*((long, short) if width > height else (short, long)), MARGIN, unit)
     found = SIZE.fullmatch(size.strip())
     if not found:
-        raise UsageError(f"not a size: {shown(size)}; write 200x150mm")
+        raise UsageError(f"not a size: {shown(size)}; write 200x150mm, or one side: 200mm or x150mm")
     factor = MILLIMETRES[(found[3] or unit).lower()]
-    sides = [float(found[i]) * factor for i in (1, 2)]
-    if not all(0 < side <= LARGEST for side in sides):
+    across, down = (float(side) * factor if side else None for side in found.groups()[:2])
+    if not all(0 < side <= LARGEST for side in (across, down) if side is not None):
         raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
-    return Sheet(sides[0], sides[1], unit=unit)
+    if across is None:
+        assert down
+        return Sheet(down * width / height, down, unit=unit)
+    return Sheet(across, across * height / width if down is None else down, unit=unit)
 
 
 def length_of(text: str, option: str) -> tuple[float, str]:

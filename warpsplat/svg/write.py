@@ -312,14 +312,11 @@ def _behind(width: str, height: str, color: FloatArray) -> str:
     return f'<rect width="{width}" height="{height}"{paint}/>'
 
 
-def on_background(text: str, color: FloatArray, own: FloatArray | None) -> str:
-    """Return a file written here on a background, sRGB in [0, 1], shape (3,), instead of its ``own``."""
+def on_background(text: str, color: FloatArray) -> str:
+    """Return a file without a background, written here, on one: sRGB in [0, 1], shape (3,)."""
     text = _plain(text)
     found = own_head(text)
-    head, rest = text[: found.end()], text[found.end() :]
-    if own is not None:
-        rest = rest.replace(_behind(found[3], found[4], own), "", 1)
-    return head + _behind(found[3], found[4], color) + rest
+    return text[: found.end()] + _behind(found[3], found[4], color) + text[found.end() :]
 
 
 def _check_finite(scene: Scene) -> None:

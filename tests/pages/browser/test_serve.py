@@ -51,6 +51,21 @@ def done(page: Page, number: int) -> None:
     page.wait_for_selector(f'.run[data-state="done"][aria-label^="{number} "]')
 
 
+def test_fields_become_settings(visit: Page) -> None:
+    page = visit
+    give(page, picture())
+    for each in page.locator("details.field").all():
+        each.evaluate("details => details.open = true")
+    page.select_option("#shape", "circle")
+    page.fill("#detail", "0.4")
+    page.fill("#background", "white")
+    page.fill("#max-bytes", "2KB")
+    start(page, 4, "Draft")
+    done(page, 1)
+    title = "1 · photo, 4 shapes, draft, circle, detail 0.4, at most 2KB, background white"
+    assert page.locator(".run h3").all_inner_texts() == [title]
+
+
 def test_two_settings_of_an_image_are_compared_and_one_is_saved(visit: Page, tmp_path: Path) -> None:
     page = visit
     give(page, picture())

@@ -46,11 +46,16 @@ def test_an_image_becomes_the_file_of_the_command_line(visitor: Visitor) -> None
 def test_the_command_has_the_settings_of_the_form() -> None:
     with Visitor(max_memory="2GB") as visitor:
         run = visitor.begin(
-            visitor.upload(picture(), "-a b.png"), colors=6, open=False, mixed=True, quality="high"
+            visitor.upload(picture(), "-a b.png"),
+            colors=6,
+            open=False,
+            mixed=True,
+            quality="high",
+            **{"max-bytes": "9KB"},
         )
         assert visitor.run(run)["command"] == (
-            "warpsplat vectorize './-a b.png' --quality high --mixed --colors 6 --max-memory 2000000000"
-            " -o './-a b.svg'"
+            "warpsplat vectorize './-a b.png' --quality high --mixed --colors 6 --max-bytes 9000"
+            " --max-memory 2000000000 -o './-a b.svg'"
         )
 
 
@@ -113,6 +118,8 @@ def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.Monkey
         ({"curves": "many"}, "curves must be a whole number from 1 to 100000, not 'many'"),
         ({"subject": "drawing", "open": True}, "subject drawing and open cannot be combined"),
         ({"closed": True, "open": True}, "closed and open cannot be combined"),
+        ({"max-bytes": "9Q"}, "not a size: '9Q'"),
+        ({"shape": "cirkle"}, "shape must be one of "),
         ({"palette": "/etc/passwd"}, "unknown setting 'palette'; there are "),
     ],
 )

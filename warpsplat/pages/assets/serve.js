@@ -128,10 +128,9 @@
   function chosen() {
     const form = new FormData(byId("form"));
     const settings = {};
-    for (const name of ["subject", "quality", "paint"]) {
-      if (form.get(name) !== facts.defaults[name]) settings[name] = form.get(name);
-    }
-    for (const name of ["curves", "colors"]) if (form.get(name)) settings[name] = Number(form.get(name));
+    for (const name in facts.defaults) if (form.get(name) !== facts.defaults[name]) settings[name] = form.get(name);
+    for (const name of ["max-bytes", "background"]) if (form.get(name)) settings[name] = form.get(name);
+    for (const name of ["curves", "colors", "detail"]) if (form.get(name)) settings[name] = Number(form.get(name));
     if (form.get("kind") !== "closed") settings[form.get("kind")] = true;
     return settings;
   }
@@ -157,6 +156,10 @@
       values.quality,
       values.paint && `${values.paint} paint`,
       values.colors && counted(values.colors, "colour"),
+      values.shape,
+      values.detail !== undefined && `detail ${values.detail}`,
+      values["max-bytes"] && `at most ${values["max-bytes"]}`,
+      values.background && `background ${values.background}`,
     ];
     return `${number} · ${words.filter(Boolean).join(", ") || "automatic"}`;
   }

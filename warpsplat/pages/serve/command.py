@@ -9,7 +9,7 @@ import webbrowser
 import click
 
 from warpsplat.cli.echo import echo, set_verbosity
-from warpsplat.cli.options import threads_option
+from warpsplat.cli.options import device_option, threads_option
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
 from warpsplat.pages.serve.sessions import Limits
@@ -44,9 +44,7 @@ from warpsplat.pages.serve.sessions import Limits
     metavar="SIZE",
     help="Memory limit of a run, such as 4GB: larger images are processed at a smaller size.",
 )
-@click.option(
-    "--device", default="auto", show_default=True, help="auto (a GPU if there is one), cpu, or cuda:N."
-)
+@device_option(default="auto", show_default=True)
 @threads_option
 def command(
     port: int,

@@ -11,14 +11,18 @@ from warpsplat.pages.environment import page
 from warpsplat.pages.serve.sessions import Limits
 from warpsplat.run.options import BY_NAME
 
-FIELDS = ("subject", "curves", "closed", "open", "mixed", "quality", "paint", "colors")
+FIELDS = (
+    *("subject", "curves", "closed", "open", "mixed", "shape", "quality", "detail", "max-bytes"),
+    *("paint", "colors", "background"),
+)
 """Options of the form, in its order."""
 
 
 def serve_page(limits: Limits) -> str:
     """Return the page as HTML. It is the same for all sessions: their states arrive as events."""
     options = {name: BY_NAME[name] for name in FIELDS}
-    defaults = {name: option.default or "" if option.choices else "" for name, option in options.items()}
+    defaults = {name: option.default or "" for name, option in options.items() if option.choices}
+    defaults["shape"] = options["shape"].default
     return page(
         "serve.html.j2",
         assets=("viewer.css", "serve.css", "viewer.js", "serve.js"),
@@ -46,4 +50,5 @@ def settings_of(given: object, max_memory: str | None) -> tuple[dict[str, Any], 
     values: dict[str, Any] = {
         name: value for name in FIELDS if (value := given.get(name)) is not None and value is not False
     }
-    return values, make_settings(max_memory=max_memory, **values)
+    keywords = {BY_NAME[name].keyword: value for name, value in values.items()}
+    return values, make_settings(max_memory=max_memory, **keywords)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import threads_option
+from warpsplat.cli.options import device_option, threads_option
 from warpsplat.errors import UsageError, counted, shown
 from warpsplat.extensions import renderer_names
 
@@ -69,7 +69,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option(
     "--opacity", type=click.FloatRange(0.02, 0.99), default=0.9, metavar="N", help="Opacity of each shape."
 )
-@click.option("--device", default="auto", help="auto, cpu, or cuda:N.")
+@device_option(default="auto")
 @threads_option
 @click.option(
     "--repeats", type=click.IntRange(1, 10_000), default=20, metavar="N", help="Number of timed steps."

@@ -9,13 +9,12 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
+from warpsplat.cli.options import device_option
 from warpsplat.errors import ExitCode
 
 
 @click.command("doctor", context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--device", default="auto", show_default=True, help="Where the self-test runs: auto, cpu, or cuda:N."
-)
+@device_option(default="auto", show_default=True, help="Where the self-test runs: auto, cpu, or cuda:N.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(device: str, as_json: bool) -> None:
     """Check that everything a run needs is installed and works.
