@@ -9,7 +9,8 @@ import torch
 
 from tests.pydiffvg.helpers import SIZE, group, scene, tensor
 from warpsplat import pydiffvg
-from warpsplat.pydiffvg.arguments import SceneArguments, serialize, serialize_cached
+from warpsplat.pydiffvg.arguments import SceneArguments, serialize
+from warpsplat.pydiffvg.cached import serialize_cached
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 
 CPU = torch.device("cpu")

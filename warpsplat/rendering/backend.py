@@ -21,8 +21,8 @@ from warpsplat.scene import FloatArray
 Buffers = TypeVar("Buffers")
 
 LINE = 64
-"""Bytes of a line of a CPU's cache. Arrays begin at multiples of it, so that each column of pixels takes one line
-and not parts of two: 512 coverages took a third longer to write."""
+"""Bytes of a line of a CPU's cache. Arrays begin at multiples of it, so that a column of pixels takes one
+line and not parts of two: the coverages of 512 shapes took half as long again."""
 
 GPU_LANES = constants.TILE_PIXELS // constants.QUAD
 """Threads a tile on a GPU."""
@@ -123,9 +123,9 @@ class Backend:
     def array(self, dtype: Any, *shape: int) -> wp.array:
         """Return a zeroed array.
 
-        On a CPU it begins at a line of the cache, and a large one takes zeroed pages from the system, each when
-        it is first used: many are larger than a scene needs, and clearing them took a third of the time of a
-        drawing's renders.
+        On a CPU it begins at a line of the cache, and a large one takes zeroed pages from the system, each
+        when it is first used: many are larger than a scene needs, and clearing them took a third of the time
+        of a drawing's renders.
         """
         if not self.device.is_cpu:
             return wp.zeros(shape, dtype=dtype, device=self.device)
@@ -194,6 +194,6 @@ def buffer(dtype: Any, *dimensions: str | int, memory_of: str = "") -> Any:
 
 def view(array: wp.array, dtype: Any, shape: tuple[int, ...]) -> wp.array:
     """Return the same memory as ``array``, read as ``shape`` elements of ``dtype``."""
-    same = wp.array(ptr=array.ptr, dtype=dtype, shape=shape, device=array.device, copy=False)
+    same: Any = wp.array(ptr=array.ptr, dtype=dtype, shape=shape, device=array.device, copy=False)
     same._ref = array  # as Warp's own views do: a program must keep the memory that its launches address
     return same
