@@ -110,8 +110,8 @@ class SceneArguments:
         ]
 
     def joined(self) -> list[Tensor]:
-        """Return the numbers of all tensors, joined by torch's own operations: for many tensors these take less
-        time than a function in Python.
+        """Return the numbers of all tensors, joined by torch's own operations: for many tensors these take
+        less time than a function in Python.
         """
         return [
             run[0] if len(run) == 1 else torch.cat(run) if run[0].dim() else torch.stack(run)
