@@ -61,8 +61,10 @@ class _Cached(NamedTuple):
     """Those of the fields."""
     sizes: list[int]
     """How many numbers each has."""
+    trainable: list[Tensor]
+    """Transforms and widths, without which scenes are simpler where they do not require gradients."""
     trained: list[bool]
-    """Which of them require gradients."""
+    """Which of them do."""
     structural: list[list[Any]]
     """Fields that belong to the structure."""
     numbers: list[Tensor | list[object]]
@@ -77,7 +79,7 @@ class _Cached(NamedTuple):
             and _same(_fields(owners), self.fields)
             and _same(_fields(self.gradients), self.gradient_fields)
             and list(map(Tensor.numel, self.tensors)) == self.sizes
-            and list(map(_is_trained, self.tensors)) == self.trained
+            and list(map(_is_trained, self.trainable)) == self.trained
             and all(map(_equal, _numbers(self.structural), self.numbers))
         )
 
@@ -110,6 +112,7 @@ def serialize_cached(
     ]
     # Copies and results of operations are made again for each scene.
     if all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors):
+        trainable = structural[2] + [shape.stroke_width for shape in shapes]
         _last = _Cached(
             frame,
             owners,
@@ -118,7 +121,8 @@ def serialize_cached(
             gradient_fields,
             tensors,
             list(map(Tensor.numel, tensors)),
-            list(map(_is_trained, tensors)),
+            trainable,
+            list(map(_is_trained, trainable)),
             structural,
             _numbers(structural),
             scene,
