@@ -46,7 +46,9 @@ def render(values: Sequence[Tensor], names: str, spec: str) -> tuple[Tensor, Ten
 
 @render.register_fake
 def _(values: Sequence[Tensor], names: str, spec: str) -> tuple[Tensor, Tensor]:
-    return images_for(specs[spec]), torch.empty(2, dtype=torch.int64)
+    viewport, device = specs[spec].viewport, specs[spec].device
+    image = torch.empty(viewport.height, viewport.width, 4, dtype=torch.float32, device=device)
+    return image, torch.empty(2, dtype=torch.int64)
 
 
 @torch.library.custom_op(
