@@ -38,7 +38,7 @@ def render(
     """Render a scene, or several; gradients flow back to the attributes.
 
     ``torch.compile`` makes it one operator of its graph; ``torch.func`` differentiates and batches it.
-    Several scenes take less time in one call: a CPU works on as many at a time as it has threads.
+    Of several scenes a CPU works on as many at a time as it has threads.
 
     Args:
         scene: one scene, or several of one size and device. A ``Scene`` is drawn as it is, on the CPU.

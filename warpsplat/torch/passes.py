@@ -103,8 +103,8 @@ class Passes(NamedTuple):
 
     each: list[Pass]
     threads: int
-    """How many are worked on at a time: on a CPU each on one thread takes less time than one after the other
-    on all threads."""
+    """How many are worked on at a time: on a CPU as many as there are threads, since a single step gains
+    little from more than four (``USUAL_THREADS``)."""
 
 
 def forward_all(specs: Sequence[RenderSpec], values: Sequence[Values], images: Tensor, held: bool) -> Passes:
