@@ -15,7 +15,7 @@ def main(source: str, output: str, steps: int = 200, curves: int = 128) -> list[
     optimizer = torch.optim.Adam(module.parameter_groups())
     for _ in range(steps):
         optimizer.zero_grad()
-        loss = (module()[..., :3] - wanted).square().mean()
+        loss = torch.nn.functional.mse_loss(module()[..., :3], wanted)
         loss.backward()
         optimizer.step()
         module.project()

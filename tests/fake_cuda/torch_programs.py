@@ -21,8 +21,7 @@ from tests.scenes import mixed_scene, random_scene
 from warpsplat import pydiffvg
 from warpsplat.rendering.device import start_warp
 from warpsplat.scene import Kind
-from warpsplat.torch import engine
-from warpsplat.torch.engine import clear_cache
+from warpsplat.torch import clear_cache, kept
 
 Tensors = dict[str, torch.Tensor]
 
@@ -64,7 +63,7 @@ def distances_of_pydiffvg() -> Tensors:
 
 def renderers_that_leave() -> Tensors:
     """Render on two streams, so that renderers leave the cache while they are at work on the other one."""
-    found, kept, engine.KEPT = {}, engine.KEPT, 1
+    found, usual, kept.KEPT = {}, kept.KEPT, 1
     streams = [None, None] if pydiffvg.get_device().type == "cpu" else [torch.cuda.Stream() for _ in range(2)]
     scenes = [
         warpsplat.torch.SceneTensors.of(random_scene(Kind.FILL, 3 + i), pydiffvg.get_device())
@@ -76,7 +75,7 @@ def renderers_that_leave() -> Tensors:
     for i, image in enumerate(found.values()):
         with torch.cuda.stream(streams[i % 2]):
             found[str(i)] = image.clone()
-    engine.KEPT = kept
+    kept.KEPT = usual
     return found
 
 

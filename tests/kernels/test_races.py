@@ -91,8 +91,7 @@ def drawing_results() -> Iterator[Arrays]:
 
 def torch_results() -> Iterator[Arrays]:
     """Render through PyTorch; yield an image and its gradients."""
-    from warpsplat.torch import SceneTensors, render
-    from warpsplat.torch.engine import clear_cache
+    from warpsplat.torch import SceneTensors, clear_cache, render
 
     clear_cache()
     tensors = SceneTensors.of(mixed_scene(), requires_grad=True)

@@ -259,7 +259,7 @@ def streams(plan: Plan) -> Iterator[Row]:
         return
     import torch
 
-    from warpsplat.torch import engine
+    from warpsplat.torch import kept
 
     count = 8
     renders = [torch_render(mixed_scene(96, 80, seed=seed), plan.device) for seed in range(2)]
@@ -283,7 +283,7 @@ def streams(plan: Plan) -> Iterator[Row]:
     same = sum(equal(one, usual) for usual, many in zip(expected, found, strict=True) for one in many)
     yield Row("two streams", f"{same} of {2 * count} as in turn", "all", same == 2 * count)
 
-    engine.KEPT = 1
+    kept.KEPT = 1
     renders = [torch_render(random_scene(Kind.FILL, 20 + i, 96, 80), plan.device) for i in range(count)]
     expected, late = [render() for render in renders], list[list[Any]]()
     on_a_stream(lambda: late.extend(render() for render in renders))

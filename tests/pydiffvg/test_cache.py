@@ -9,7 +9,8 @@ import torch
 
 from tests.pydiffvg.helpers import SIZE, group, scene, tensor
 from warpsplat import pydiffvg
-from warpsplat.pydiffvg.arguments import SceneArguments, serialize, serialize_cached
+from warpsplat.pydiffvg.arguments import SceneArguments, serialize
+from warpsplat.pydiffvg.cached import serialize_cached
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 
 CPU = torch.device("cpu")
@@ -60,6 +61,7 @@ CHANGES: dict[str, Callable[[Scene], None]] = {
     "transform": _write(lambda s: s[1][3].shape_to_canvas, [[1.0, 0, 3], [0, 1, 0], [0, 0, 1]]),
     "stretch": _write(lambda s: s[1][5].shape_to_canvas, [[1.0, 0, 3], [0, 2, 0], [0, 0, 1]]),
     "trained transform": lambda s: setattr(s[1][3].shape_to_canvas, "requires_grad", True),
+    "trained width": lambda s: setattr(s[0][0].stroke_width, "requires_grad", True),
     "sizes": lambda s: setattr(s[0][3].points, "data", torch.ones(7, 2)),  # type: ignore[union-attr]
     "more": lambda s: s[1].append(s[1][3]),
     "order": lambda s: s[1].reverse(),
@@ -89,3 +91,12 @@ def test_copies_and_results_are_made_again(kind: str) -> None:
     second = cached(*made)
     assert second is not first
     assert torch.equal(second.tensors[0].detach(), values.detach().float())
+
+
+def test_a_width_that_nothing_shows_has_no_gradient_or_that_of_nothing() -> None:
+    shapes, groups = scene()
+    assert all(shapes[0].stroke_width is not each for each in cached(shapes, groups).tensors)
+    width = shapes[0].stroke_width.requires_grad_()
+    arguments = pydiffvg.RenderFunction.serialize_scene(SIZE, SIZE, shapes, groups)
+    image = pydiffvg.RenderFunction.apply(SIZE, SIZE, 2, 2, 0, None, *arguments)
+    assert torch.autograd.grad(image.sum(), width)[0] == 0

@@ -14,7 +14,7 @@ import pytest
 import warp as wp
 
 from tests.scenes import random_scene
-from warpsplat.rendering import helpers, program
+from warpsplat.rendering import helpers
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.program import Launch, Program
 from warpsplat.rendering.renderer import render
@@ -63,7 +63,7 @@ class LateHelpers:
 
 def test_helpers_that_come_too_late_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     crew = LateHelpers()
-    monkeypatch.setattr(program, "helpers", lambda threads: crew)
+    monkeypatch.setattr(helpers, "helpers", lambda threads: crew)
     done: list[int] = []
     late = Program(wp.get_device("cpu"), 2)
     late.launches.append(Launch("", "note", tuple(functools.partial(done.append, i) for i in range(5))))

@@ -12,6 +12,7 @@ import warp as wp
 
 from tests import fake_cuda
 from warpsplat.kernels import constants
+from warpsplat.rendering.backend import LINE, Backend, view
 from warpsplat.rendering.program import Program, bind, capture
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
@@ -68,6 +69,42 @@ def test_arrays_live_as_long_as_the_program(device: str) -> None:
     assert alive()
     program.run()
     np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
+
+
+def test_a_program_keeps_the_memory_that_views_read(device: str) -> None:
+    program, result = Program(wp.get_device(device)), floats(0, 0, 0, device=device)
+    shift, slope = (floats(*x, device=device) for x in ([10, 20, 30], [1, 2, 3]))
+    alive = weakref.ref(slope)
+    program.launch(affine, 3, shift=shift, slope=view(slope, wp.float32, (3,)), factor=2.0, result=result)
+    del slope
+    assert alive()
+
+
+def test_arrays_begin_at_lines_of_the_cache_and_are_zero() -> None:
+    backend = Backend.on("cpu", 1)
+    for size in (0, 1, 100, 10_000, 1_000_003):
+        for _ in range(3):
+            array = backend.array(wp.float32, size)
+            assert array.shape == (size,)
+            assert size == 0 or array.ptr % LINE == 0
+            assert not array.numpy().any()
+            array.fill_(1.0)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_array_is_bound_to_other_memory(device: str, threads: int) -> None:
+    own = wp.get_device(device)
+    program = Program(own, threads)
+    shift, slope = (floats(*x, device=device) for x in ([10, 20, 30], [1, 2, 3]))
+    results = [wp.zeros(3, dtype=wp.float32, device=own) for _ in range(2)]
+    placeholder = view(slope, wp.float32, (3,))
+    program.launch(affine, 3, shift=shift, slope=slope, factor=2.0, result=placeholder, split=True)
+    for result in (*results, results[0]):
+        result.zero_()
+        program.rebind("result", result.ptr)
+        program.run()
+        np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
+    np.testing.assert_array_equal(slope.numpy(), [1, 2, 3])
 
 
 COMPLETE: dict[str, Any] = {"slope": 1, "shift": 2, "factor": 3, "result": 4}

@@ -55,7 +55,7 @@ def compare_straight(scene: Scene, threads: int) -> None:
     weights = torch.tensor(np.random.default_rng(1).normal(size=tuple(image.shape))) * seen
     found = SceneTensors.of(scene, requires_grad=True)
     spec = RenderSpec(scene, v, EXACT, torch.device("cpu"), threads, opaque=True, straight=True)
-    shown = draw(spec, {a.name: found.value(a) for a in attributes_of(scene)})
+    shown = draw([spec], [{a.name: found.value(a) for a in attributes_of(scene)}]).squeeze(0)
     assert float(((shown - image).detach() * seen).abs().max()) < 1e-3
     (image * weights).sum().backward()
     (shown * weights.float()).sum().backward()

@@ -15,7 +15,7 @@ from tests.scenes import random_scene, styled_scene
 from warpsplat.errors import UsageError
 from warpsplat.rendering import kernel_cache
 from warpsplat.scene import Cap, Join, Kind, Scene
-from warpsplat.torch import SceneTensors, clear_cache, engine, passes, render
+from warpsplat.torch import SceneTensors, clear_cache, kept, passes, render
 
 
 def step(scene: Scene, width: int = 40) -> torch.Tensor:
@@ -50,27 +50,27 @@ def test_scenes_of_one_structure_share_an_engine(engines: int, change: Callable[
     scene = styled_scene(Cap.BUTT, Join.BEVEL, 1)
     images = [render(SceneTensors.of(each)) for each in (scene, change(scene), scene)]
     assert torch.equal(images[0], images[2])
-    assert len(engine.engines) == engines
+    assert len(kept.engines) == engines
 
 
 def test_changing_scenes_do_not_compile(monkeypatch: pytest.MonkeyPatch) -> None:
     step(random_scene(Kind.FILL, 2))
     monkeypatch.setattr(kernel_cache, "compile_by", None)
-    monkeypatch.setattr(engine, "KEPT", 3)
+    monkeypatch.setattr(kept, "KEPT", 3)
     for count in range(3, 8):
         step(random_scene(Kind.FILL, count))
-    assert len(engine.engines) == 3
+    assert len(kept.engines) == 3
 
 
 def test_bytes_are_counted_and_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = random_scene(Kind.FILL, 2)
     step(scene)
     step(scene, 800)
-    small, large = (each.bytes for each in engine.engines.values())
+    small, large = (each.bytes for _, each in kept.engines)
     assert 50_000 < small < large / 20
-    monkeypatch.setattr(engine, "KEPT_BYTES", 1)
+    monkeypatch.setattr(kept, "_limit", lambda device: 1)
     step(random_scene(Kind.FILL, 3))
-    assert len(engine.engines) == 1
+    assert len(kept.engines) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
@@ -94,7 +94,7 @@ def capturing(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
     """Pretend that a CUDA graph is being captured: everything but CUDA's own part."""
 
     def pretend(value: bool) -> None:
-        for module in (engine, passes):
+        for module in (kept, passes):
             monkeypatch.setattr(module, "is_capturing", lambda device: value)
 
     return pretend
@@ -104,7 +104,7 @@ def test_a_captured_engine_stays_as_it_is(capturing: Callable[[bool], None]) -> 
     """A graph replays its launches without a call, whatever other calls do meanwhile."""
     scene = random_scene(Kind.FILL, 3)
     wanted = step(scene)
-    (warm,) = engine.engines.values()
+    ((_, warm),) = kept.engines
     capturing(True)
     assert torch.equal(step(scene), wanted)
     launches = warm._renderer.forward_program
@@ -116,10 +116,10 @@ def test_a_captured_engine_stays_as_it_is(capturing: Callable[[bool], None]) -> 
     assert warm._renderer.forward_program is launches
     capturing(False)
     step(scene)
-    assert warm not in engine.engines.values()
-    assert list(engine.captured.values()) == [warm]
+    assert warm not in [each for _, each in kept.engines]
+    assert list(kept.captured.values()) == [warm]
     clear_cache()
-    assert not engine.captured
+    assert not kept.captured
 
 
 def test_opacities_in_a_graph_stay_where_their_adjoint_is_right(capturing: Callable[[bool], None]) -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import functools
-import operator
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from torch._utils import _flatten_dense_tensors
 
 from warpsplat.errors import UsageError
 from warpsplat.pydiffvg.color import Color, LinearGradient, RadialGradient
@@ -100,12 +98,31 @@ class SceneArguments:
     """[canvas units]"""
     structure: Structure
     tensors: tuple[Tensor, ...]
-    """For each shape its coordinates and width, then for each group its fill, stroke and transform."""
+    """The shapes' coordinates, their widths, the groups' fills, strokes and transforms: those of one kind lie
+    side by side, so that ``joined`` has few operations."""
+
+    @functools.cached_property
+    def _runs(self) -> list[tuple[Tensor, ...]]:
+        """Neighbours that can be joined along their first dimension, or are single numbers."""
+        return [
+            tuple(run)
+            for _, run in itertools.groupby(self.tensors, lambda each: each.shape[1:] or each.dim())
+        ]
+
+    def joined(self) -> list[Tensor]:
+        """Return the numbers of all tensors, joined by torch's own operations: for many tensors these take
+        less time than a function in Python.
+        """
+        return [
+            run[0] if len(run) == 1 else torch.cat(run) if run[0].dim() else torch.stack(run)
+            for run in self._runs
+        ]
 
     @functools.cached_property
     def places(self) -> tuple[Place, ...]:
-        """Where the tensors' values lie among the scene's numbers."""
-        return places_of(self.tensors)
+        """Where the values of ``joined`` lie among the scene's numbers."""
+        with torch.no_grad():
+            return places_of(self.joined())
 
 
 def serialize(
@@ -116,17 +133,42 @@ def serialize(
     A ``UsageError`` names a shape or group that cannot be rendered.
     """
     tensors = _Tensors(device)
+    ids = [_ids(group, f"group {number}", len(shapes)) for number, group in enumerate(groups)]
+    stroked = {
+        i for group, own in zip(groups, ids, strict=True) if group.stroke_color is not None for i in own
+    }
     forms = [_shape(shape, f"shape {number}", tensors) for number, shape in enumerate(shapes)]
+    forms = [
+        _with_width(form, shape, f"stroke_width of shape {number}", number in stroked, tensors)
+        for number, (form, shape) in enumerate(zip(forms, shapes, strict=True))
+    ]
+    fills = [_paint(group.fill_color, f"fill_color of group {i}", tensors) for i, group in enumerate(groups)]
+    strokes = [
+        _paint(group.stroke_color, f"stroke_color of group {i}", tensors) for i, group in enumerate(groups)
+    ]
     widths = [id(shape.stroke_width) for shape in shapes]
-    structures = []
-    for number, group in enumerate(groups):
-        name, ids = f"group {number}", _list(group.shape_ids)
-        for i in ids:
-            if not 0 <= i < len(shapes):
-                raise UsageError(f"{name} names shape {i}, there are {len(shapes)}")
-        one_width = len({widths[i] for i in ids}) <= 1
-        structures.append(_group(group, name, tuple(forms[i] for i in ids), one_width, tensors))
+    structures = [
+        GroupStructure(
+            shapes=tuple(forms[i] for i in own),
+            fill=fill,
+            stroke=stroke,
+            even_odd=bool(group.use_even_odd_rule),
+            one_width=len({widths[i] for i in own}) <= 1,
+            line=getattr(group, "line", None),
+            **_transform(group, f"shape_to_canvas of group {number}", tensors),
+        )
+        for number, (group, own, fill, stroke) in enumerate(zip(groups, ids, fills, strokes, strict=True))
+    ]
     return SceneArguments(int(width), int(height), Structure(tuple(structures)), tuple(tensors.found))
+
+
+def _ids(group: ShapeGroup, name: str, count: int) -> list[int]:
+    """Return the indices of a group's shapes, of which there are ``count``."""
+    found = _list(group.shape_ids)
+    for i in found:
+        if not 0 <= i < count:
+            raise UsageError(f"{name} names shape {i}, there are {count}")
+    return found
 
 
 class _Tensors:
@@ -153,15 +195,15 @@ class _Tensors:
         at, self._next = self._next, self._next + value.numel()
         return at
 
-    def add_widths(self, value: Tensor, points: int, name: str) -> int:
-        """Collect a tensor with a number for each point, and maybe more."""
-        surplus = isinstance(value, Tensor) and value.dim() == 1 and len(value) > points
-        return self.add(value, (-1,) if surplus else (points,), name)
 
-    def add_number(self, value: Tensor, name: str) -> int:
-        """Collect a tensor that holds one number, in any shape."""
-        is_number = isinstance(value, Tensor) and value.numel() == 1
-        return self.add(value, tuple(value.shape) if is_number else (), name)
+def _widths_shape(value: Tensor, points: int) -> tuple[int, ...]:
+    """Return the shape of a tensor with a number for each point, and maybe more."""
+    return (-1,) if value.dim() == 1 and len(value) > points else (points,)
+
+
+def _number_shape(value: object) -> tuple[int, ...]:
+    """Return the shape of a tensor that holds one number, in any shape."""
+    return tuple(value.shape) if isinstance(value, Tensor) and value.numel() == 1 else ()
 
 
 def _list(values: Tensor | Sequence[int]) -> list[int]:
@@ -182,16 +224,25 @@ def _shape(shape: Shape, name: str, tensors: _Tensors) -> ShapeStructure:
         first = tensors.add(shape.center, (2,), f"center of {name}")
         if isinstance(shape, Circle):
             kind = "circle"
-            tensors.add_number(shape.radius, f"radius of {name}")
+            tensors.add(shape.radius, _number_shape(shape.radius), f"radius of {name}")
         else:
             tensors.add(shape.radius, (2,), f"radius of {name}")
     else:
         raise UsageError(f"{name} is a {type(shape).__name__}, no shape of pydiffvg")
     points = sum(counts) + len(counts) + (not closed)
-    width, name = shape.stroke_width, f"stroke_width of {name}"
+    return ShapeStructure(kind, counts, closed, points, False, first, ZERO)
+
+
+def _with_width(
+    form: ShapeStructure, shape: Shape, name: str, is_stroked: bool, tensors: _Tensors
+) -> ShapeStructure:
+    """Return the structure of a shape with its width; without that where nothing depends on it."""
+    width = shape.stroke_width
     tapers = isinstance(width, Tensor) and width.numel() != 1
-    at = tensors.add_widths(width, points, name) if tapers else tensors.add_number(width, name)
-    return ShapeStructure(kind, counts, closed, points, tapers, first, at)
+    wanted = _widths_shape(width, form.points) if tapers else _number_shape(width)
+    if not is_stroked and not tensors.check(width, wanted, name).requires_grad:
+        return form
+    return form._replace(tapers=tapers, width=tensors.add(width, wanted, name))
 
 
 def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
@@ -209,19 +260,14 @@ def _counts(shape: Path | Polygon, points: int, name: str) -> tuple[int, ...]:
     return counts
 
 
-def _group(
-    group: ShapeGroup, name: str, shapes: tuple[ShapeStructure, ...], one_width: bool, tensors: _Tensors
-) -> GroupStructure:
-    fill = _paint(group.fill_color, f"fill_color of {name}", tensors)
-    stroke = _paint(group.stroke_color, f"stroke_color of {name}", tensors)
-    transform, uniform = None, True
-    matrix = tensors.check(group.shape_to_canvas, (3, 3), f"shape_to_canvas of {name}")
-    if matrix.requires_grad or matrix.tolist() != IDENTITY:
-        transform = tensors.add(matrix, (3, 3), name)
-        scales = np.linalg.svd(matrix[:2, :2].detach().cpu().numpy(), compute_uv=False)
-        uniform = bool(scales[1] >= (1 - UNIFORM_TOLERANCE) * scales[0])
-    even_odd, line = bool(group.use_even_odd_rule), getattr(group, "line", None)
-    return GroupStructure(shapes, fill, stroke, even_odd, transform, uniform, one_width, line)
+def _transform(group: ShapeGroup, name: str, tensors: _Tensors) -> dict[str, Any]:
+    """Return what a group's structure says about its transform."""
+    matrix = tensors.check(group.shape_to_canvas, (3, 3), name)
+    if not matrix.requires_grad and matrix.tolist() == IDENTITY:
+        return {"transform": None, "uniform": True}
+    scales = np.linalg.svd(matrix[:2, :2].detach().cpu().numpy(), compute_uv=False)
+    uniform = bool(scales[1] >= (1 - UNIFORM_TOLERANCE) * scales[0])
+    return {"transform": tensors.add(matrix, (3, 3), name), "uniform": uniform}
 
 
 def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
@@ -239,87 +285,3 @@ def _paint(color: Color, name: str, tensors: _Tensors) -> PaintStructure | None:
     tensors.add(color.offsets, (-1,), f"offsets of {name}")
     tensors.add(color.stop_colors, (len(color.offsets), 4), f"stop_colors of {name}")
     return PaintStructure(kind, len(color.offsets), first)
-
-
-# The last scene, used again while shapes and groups are the same with the same tensors.
-
-
-def _objects(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[object]:
-    """Return shapes, groups and gradients and their fields, which are compared by identity."""
-    owners: list[object] = [*shapes, *groups]
-    fields = list(chain.from_iterable(map(dict.values, map(vars, owners))))
-    if not {LinearGradient, RadialGradient}.isdisjoint(map(type, fields)):
-        gradients = [each for each in fields if isinstance(each, (LinearGradient, RadialGradient))]
-        fields += chain.from_iterable(vars(each).values() for each in gradients)
-    return owners + fields
-
-
-def _numbers(shapes: Sequence[Shape], groups: Sequence[ShapeGroup]) -> list[Tensor | list[object]]:
-    """Return the numbers that belong to the structure, those of each field together.
-
-    They are compared by value, as code can write into tensors without leaving a trace.
-    """
-    matrices = [group.shape_to_canvas for group in groups]
-    return [
-        _joined([shape.num_control_points for shape in shapes if isinstance(shape, Path)]),
-        _joined([group.shape_ids for group in groups]),
-        _joined(matrices),
-        [matrix.requires_grad for matrix in matrices],
-    ]
-
-
-@torch.no_grad()
-def _joined(values: Sequence[Any]) -> Tensor | list[object]:
-    """Return all numbers of tensors or lists: a few operations for many tensors on the CPU."""
-    if values and all(isinstance(each, Tensor) and each.is_cpu for each in values):
-        return _flatten_dense_tensors(values)
-    return [each.tolist() if hasattr(each, "tolist") else list(each) for each in values]
-
-
-def _equal(a: Tensor | list[object], b: Tensor | list[object]) -> bool:
-    return torch.equal(a, b) if isinstance(a, Tensor) and isinstance(b, Tensor) else bool(a == b)
-
-
-class _Cached(NamedTuple):
-    """A scene and what it was made of."""
-
-    frame: tuple[object, ...]
-    """Size, device and number of shapes."""
-    objects: list[object]
-    tensors: list[Tensor]
-    """Those of the objects."""
-    sizes: list[int]
-    """How many numbers each has."""
-    numbers: list[Tensor | list[object]]
-    scene: SceneArguments
-
-
-_last: _Cached | None = None
-
-
-def serialize_cached(
-    width: int, height: int, shapes: Sequence[Shape], groups: Sequence[ShapeGroup], device: torch.device
-) -> SceneArguments:
-    """Return ``serialize`` of the arguments, or the last result where only values in tensors have changed."""
-    global _last  # noqa: PLW0603 - one scene is kept, with its tensors, until the next
-    frame, objects = (int(width), int(height), device, len(shapes)), _objects(shapes, groups)
-    last = _last  # another thread may replace it meanwhile
-    if (
-        last
-        and frame == last.frame
-        and len(objects) == len(last.objects)
-        and all(map(operator.is_, objects, last.objects))
-        and list(map(Tensor.numel, last.tensors)) == last.sizes
-        and all(map(_equal, _numbers(shapes, groups), last.numbers))
-    ):
-        return last.scene
-    scene = serialize(width, height, shapes, groups, device)
-    own = set(map(id, objects))
-    # Copies and results of operations are made again for each scene.
-    if all(id(tensor) in own and tensor.grad_fn is None for tensor in scene.tensors):
-        tensors = [each for each in objects if isinstance(each, Tensor)]
-        numbers = _numbers(shapes, groups)
-        _last = _Cached(frame, objects, tensors, list(map(Tensor.numel, tensors)), numbers, scene)
-    else:
-        _last = None
-    return scene

@@ -21,7 +21,7 @@ def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     canvas = layout.scene.canvas
     scale = canvas.width / scene.width, canvas.height / scene.height
     numbers, points, colors, opacities, *widths = GatherAll.apply(
-        scene.places, layout.gathers, *scene.tensors
+        scene.places, layout.gathers, *scene.joined()
     )
     if layout.order is not None:
         points = torch.cat([points, *(area.points(numbers) for area in layout.areas)])

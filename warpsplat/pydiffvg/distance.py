@@ -58,7 +58,7 @@ def distances(scene: SceneArguments, positions: Tensor, threads: int) -> Tensor:
     curves = curves_of(scene.structure, positions.device)
     if not len(curves.kind):
         return torch.zeros(len(positions), device=positions.device)
-    numbers: Tensor = GatherAll.apply(scene.places, (), *scene.tensors)[0]
+    numbers: Tensor = GatherAll.apply(scene.places, (), *scene.joined())[0]
     controls = curves.controls(numbers)
     if curves.transforms is not None:
         matrices = numbers.index_select(0, curves.transforms).view(-1, 1, 3, 3)

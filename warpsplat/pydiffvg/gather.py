@@ -75,10 +75,7 @@ class Gather:
 
 
 class GatherAll(torch.autograd.Function):
-    """Tensors -> their numbers one after the other, behind the constants 0 and 1; and sums of these.
-
-    One operation for all of them: one of torch's for each of hundreds of tensors takes longer than rendering.
-    """
+    """Tensors -> their numbers one after the other, behind the constants 0 and 1; and sums of these."""
 
     @staticmethod
     def forward(

@@ -13,15 +13,16 @@ import torch
 
 from warpsplat.errors import UsageError
 from warpsplat.kernels import constants
-from warpsplat.pydiffvg.arguments import SceneArguments, serialize_cached
+from warpsplat.pydiffvg.arguments import SceneArguments
 from warpsplat.pydiffvg.assemble import assemble
+from warpsplat.pydiffvg.cached import serialize_cached
 from warpsplat.pydiffvg.device import get_device
 from warpsplat.pydiffvg.layout import Layout, make_layout
 from warpsplat.pydiffvg.pixel_filter import PixelFilter
 from warpsplat.pydiffvg.shape import Shape, ShapeGroup
 from warpsplat.torch import SceneTensors, render
-from warpsplat.torch.engine import check_memory
 from warpsplat.torch.function import draw
+from warpsplat.torch.kept import check_memory
 from warpsplat.torch.tensors import extremes
 
 Tensor = torch.Tensor
@@ -256,7 +257,7 @@ def _render(
         began = time.perf_counter()
     if background is None:
         check_memory(layout.spec)
-        result = draw(layout.spec, values)
+        result = draw([layout.spec], [values]).squeeze(0)
     else:
         result = render(SceneTensors(layout.scene, values))
         if bool((background[..., 3] >= 1).all()):

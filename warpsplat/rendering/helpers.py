@@ -7,7 +7,7 @@ import functools
 import os
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 
 class LaunchRequest:
@@ -71,6 +71,26 @@ class Helpers:
 def helpers(threads: int) -> Helpers:
     """Return the helpers for so many threads, kept for the next program."""
     return Helpers(threads - 1)
+
+
+def shared(works: Sequence[Callable[[], None]], threads: int) -> None:
+    """Do all ``works``, at the same time on up to so many threads."""
+    rest = iter(works)
+
+    def work() -> None:
+        # Taking from a shared iterator is atomic: each thread takes the next piece when it is done.
+        for each in rest:
+            each()
+
+    requests: list[LaunchRequest] = []
+    if len(works) > 1 and threads > 1:
+        crew = helpers(threads)
+        requests = [crew.ask(work) for _ in range(min(crew.count, len(works) - 1))]
+    try:
+        work()
+    finally:  # an interruption must not free arrays that helpers still write
+        for request in requests:
+            request.settle()  # on a busy machine helpers may come too late
 
 
 if hasattr(os, "register_at_fork"):

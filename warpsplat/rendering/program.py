@@ -18,7 +18,7 @@ import warp as wp
 from warpsplat.errors import cause_of
 from warpsplat.native import messages_hidden
 from warpsplat.rendering.device_lock import exclusive
-from warpsplat.rendering.helpers import LaunchRequest, helpers
+from warpsplat.rendering.helpers import shared
 from warpsplat.rendering.kernel_cache import load
 
 log = logging.getLogger(__name__)
@@ -55,6 +55,8 @@ class Program:
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
         self._commands: list[tuple[wp.Launch, ctypes.Structure | None]] = []
+        self._places: dict[str, list[Any]] = {}
+        """Where the launches recorded so far have an array, by its name; see ``rebind``."""
 
     def launch(
         self,
@@ -96,17 +98,20 @@ class Program:
         self._commands += commands
         self.launches.append(Launch(self.stage, kernel.key, tuple(itertools.starmap(replay, commands))))
 
-    def rebind(self, name: str, array: wp.array) -> None:
-        """Bind parameter ``name`` of all launches that have it to ``array``, of the same type as before. The
-        caller keeps the array alive.
+    def rebind(self, name: str, pointer: int) -> None:
+        """Give the array ``name``, which only this program has, other memory: in all its launches. The caller
+        keeps that alive.
         """
-        value = array.__ctype__()
-        for command, packed in self._commands:
-            for index, argument in enumerate(command.kernel.adj.args):
-                if argument.label == name:
-                    command.set_param_at_index_from_ctype(index, value)
-                    if packed is not None:
-                        setattr(packed, name, value)
+        if name not in self._places:
+            self._places[name] = [
+                place
+                for command, packed in self._commands
+                for index, argument in enumerate(command.kernel.adj.args)
+                if argument.label == name
+                for place in (command.params[1 + index], *([getattr(packed, name)] if packed else []))
+            ]
+        for place in self._places[name]:
+            place.data = pointer
 
     def memory(self) -> dict[int, int]:
         """Return the bytes of the arrays of all launches, by address."""
@@ -117,35 +122,17 @@ class Program:
         """Append a host function that launches device work (a scan, a sort)."""
         self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))
 
-    def _replay(self, launch: Launch) -> None:
-        pieces = iter(launch.pieces)
-
-        def work() -> None:
-            # Taking from a shared iterator is atomic: each thread takes the next piece when it is done.
-            for piece in pieces:
-                piece()
-
-        requests: list[LaunchRequest] = []
-        if len(launch.pieces) > 1:
-            crew = helpers(self.threads)
-            requests = [crew.ask(work) for _ in range(min(crew.count, len(launch.pieces) - 1))]
-        try:
-            work()
-        finally:  # an interruption must not free arrays that helpers still write
-            for request in requests:
-                request.settle()  # on a busy machine helpers may come too late
-
     def run(self) -> None:
         """Replay all launches."""
         for launch in self.launches:
-            self._replay(launch)
+            shared(launch.pieces, self.threads)
 
     def run_timed(self) -> dict[tuple[str, str], float]:
         """Replay all launches, waiting for the device after each; seconds by stage and name."""
         seconds: dict[tuple[str, str], float] = {}
         for launch in self.launches:
             begin = time.perf_counter()
-            self._replay(launch)
+            shared(launch.pieces, self.threads)
             wp.synchronize_device(self.device)
             spent = time.perf_counter() - begin
             key = (launch.stage, launch.name)

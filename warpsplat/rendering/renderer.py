@@ -93,8 +93,9 @@ class Renderer:
         check_memory(viewport, self.backend.device)
         self.model, self._opaque = model, opaque or straight
         self.film = Film(self.backend, viewport, parameters.canvas, opaque=self._opaque, straight=straight)
-        self.needed_samples = self.backend.array(wp.int32, 1)
-        self.needed_slots = self.backend.array(wp.int32, 1)
+        self._needed = self.backend.array(wp.int32, 2)
+        self.needed_samples, self.needed_slots = self._needed[:1], self._needed[1:]
+        self._needed_on_host = self._needed.numpy() if self.backend.device.is_cpu else None
         shapes = parameters.shape_count
         first_guess = Capacity(
             model.samples_per_shape * shapes, viewport.tile_count + SLOTS_PER_SHAPE * shapes
@@ -221,13 +222,12 @@ class Renderer:
         """Enlarge the arrays and record the programs again if a pass since the last call ran out of capacity;
         return whether it did.
 
-        Reads two counters back from the device.
+        Reads two counters back from the device, at once.
 
         Raises:
             CapacityError: the scene needs more than SLOT_LIMIT or SAMPLE_LIMIT.
         """
-        samples = int(self.needed_samples.numpy()[0])
-        slots = int(self.needed_slots.numpy()[0])
+        samples, slots = self._needs()
         if samples > SAMPLE_LIMIT or slots > SLOT_LIMIT:
             need = f"{_counted(samples)} samples and {_counted(slots)} tile slots"
             raise CapacityError(
@@ -237,15 +237,19 @@ class Renderer:
         now = self.capacity
         if samples <= now.samples and slots <= now.slots:
             return False
-        self.needed_samples.zero_()
-        self.needed_slots.zero_()
+        self._needed.zero_()
         self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
         return True
 
     def capacity_and_need(self) -> tuple[Capacity, Capacity]:
         """Return the capacity, and the largest need since it last grew: a pass depends on both."""
-        samples, slots = (int(count.numpy()[0]) for count in (self.needed_samples, self.needed_slots))
-        return self.capacity, Capacity(samples, slots)
+        return self.capacity, Capacity(*self._needs())
+
+    def _needs(self) -> list[int]:
+        """Return the numbers of samples and of slots that the passes needed."""
+        shared = self._needed_on_host  # a CPU's, which costs less to keep than to ask for
+        counts: list[int] = (self._needed.numpy() if shared is None else shared).tolist()
+        return counts
 
     def restore_capacity(self, capacity: Capacity, needed: Capacity) -> None:
         """Set ``capacity_and_need`` to that of an earlier renderer of the same shapes; may record again."""

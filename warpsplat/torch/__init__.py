@@ -9,8 +9,8 @@ try:
 except ImportError as error:
     raise ImportError("warpsplat.torch needs PyTorch: pip install warpsplat[torch]") from error
 
-from warpsplat.torch.engine import clear_cache as clear_cache
 from warpsplat.torch.function import over as over
 from warpsplat.torch.function import render as render
+from warpsplat.torch.kept import clear_cache as clear_cache
 from warpsplat.torch.module import Module as Module
 from warpsplat.torch.tensors import SceneTensors as SceneTensors

@@ -18,8 +18,9 @@ from warpsplat.run.arguments import check_threads
 from warpsplat.run.render import zoom_of
 from warpsplat.scene import Canvas, Scene
 from warpsplat.torch.drawable import drawable
-from warpsplat.torch.engine import RenderSpec, check_memory
-from warpsplat.torch.passes import backward, forward
+from warpsplat.torch.engine import RenderSpec
+from warpsplat.torch.kept import check_memory
+from warpsplat.torch.passes import backward_all, forward_all, images_for
 from warpsplat.torch.tensors import SceneTensors
 from warpsplat.torch.transforms import Transformed, are_active
 
@@ -37,6 +38,7 @@ def render(
     """Render a scene, or several; gradients flow back to the attributes.
 
     ``torch.compile`` makes it one operator of its graph; ``torch.func`` differentiates and batches it.
+    Of several scenes a CPU works on as many at a time as it has threads.
 
     Args:
         scene: one scene, or several of one size and device. A ``Scene`` is drawn as it is, on the CPU.
@@ -58,12 +60,12 @@ def render(
         TypeError: no scene.
     """
     if isinstance(scene, (Scene, SceneTensors)):
-        return _render([scene], width, height, renderer, threads)[0]
+        return _render([scene], width, height, renderer, threads).squeeze(0)
     if not isinstance(scene, (list, tuple)):
         raise TypeError(_not_a_scene(scene))
     if not scene:
         raise UsageError("no scene to render")
-    return torch.stack(_render(scene, width, height, renderer, threads))
+    return _render(scene, width, height, renderer, threads)
 
 
 def _render(
@@ -72,31 +74,42 @@ def _render(
     height: int | None,
     renderer: str | Model,
     threads: int | None,
-) -> list[Tensor]:
+) -> Tensor:
     """Return the image of each scene; see ``render``."""
     scenes = [drawable(_tensors_of(each), renderer) for each in given]
     if torch.compiler.is_compiling():
         width, height = (side if side is None else operator.index(side) for side in (width, height))  # static
         keys = [spec_key(one.layout, width, height, renderer, threads, one.device) for one in scenes]
-        return [
-            torch.ops.warpsplat.render(list(one.values.values()), ",".join(one.values), key)[0]
-            for one, key in zip(scenes, keys, strict=True)
-        ]
-    all_specs = [spec_of(one.layout, width, height, renderer, threads, one.device) for one in scenes]
-    if len({(spec.viewport.width, spec.viewport.height, spec.device) for spec in all_specs}) > 1:
+        return _stacked(
+            [
+                torch.ops.warpsplat.render(list(one.values.values()), ",".join(one.values), key)[0]
+                for one, key in zip(scenes, keys, strict=True)
+            ]
+        )
+    specs = [spec_of(one.layout, width, height, renderer, threads, one.device) for one in scenes]
+    if len({(spec.viewport.width, spec.viewport.height, spec.device) for spec in specs}) > 1:
         raise UsageError("scenes of several sizes or devices in one call")
-    check_memory(all_specs[0], len(all_specs))
-    return [draw(spec, one.drawn()) for spec, one in zip(all_specs, scenes, strict=True)]
+    check_memory(specs[0], len(specs))
+    return draw(specs, [one.drawn() for one in scenes])
 
 
-def draw(spec: RenderSpec, values: Mapping[str, Tensor]) -> Tensor:
-    """Render all attributes that the shapes have, by name, in float32; shape (height, width, 4).
+def draw(specs: Sequence[RenderSpec], values: Sequence[Mapping[str, Tensor]]) -> Tensor:
+    """Render scenes of one size, shape (scene, height, width, 4).
 
-    Values are checked if ``spec.opaque`` is None, see ``examined``.
+    ``specs``: of each scene; ``values``: all attributes that its shapes have, by name, in float32. They are
+    checked if ``spec.opaque`` is None, see ``examined``.
     """
-    arguments = spec, tuple(values), *values.values()
-    image: Tensor = Transformed.apply(*arguments)[0] if are_active() else _Render.apply(*arguments)
-    return image
+    if are_active():
+        each = zip(specs, values, strict=True)
+        return _stacked([Transformed.apply(spec, tuple(own), *own.values())[0] for spec, own in each])
+    flat = itertools.chain.from_iterable(own.values() for own in values)
+    images: Tensor = _Render.apply(specs, [tuple(own) for own in values], *flat)
+    return images
+
+
+def _stacked(images: list[Tensor]) -> Tensor:
+    """Return images as one tensor, shape (scene, height, width, 4); a single one is not copied."""
+    return torch.stack(images) if len(images) > 1 else images[0].unsqueeze(0)
 
 
 def over(image: Tensor, background: Tensor | Sequence[float] | float) -> Tensor:
@@ -170,22 +183,35 @@ def viewport_of(canvas: Canvas, width: int | None, height: int | None) -> Viewpo
 
 
 class _Render(torch.autograd.Function):
-    """Attributes, in the order of ``names`` -> image."""
+    """Attributes of scenes, in the order of their ``names`` -> images, shape (scene, height, width, 4)."""
 
     @staticmethod
-    def forward(ctx: Any, spec: RenderSpec, names: tuple[str, ...], *values: Tensor) -> Tensor:
-        image, ctx.spec, ctx.ticket = forward(spec, dict(zip(names, values, strict=True)))
+    def forward(
+        ctx: Any, specs: Sequence[RenderSpec], names: Sequence[tuple[str, ...]], *values: Tensor
+    ) -> Tensor:
+        scenes = _by_scene(names, values)
+        held = any(ctx.needs_input_grad)
+        images = images_for(specs[0], len(specs))
+        ctx.passes = forward_all(specs, scenes, images, held)
         ctx.names = names
         ctx.save_for_backward(*values)
         ctx.set_materialize_grads(False)
-        return image
+        return images
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, image_grad: Tensor | None) -> tuple[Tensor | None, ...]:
-        if image_grad is None:
+    def backward(ctx: Any, image_grads: Tensor | None) -> tuple[Tensor | None, ...]:
+        if image_grads is None:
             return (None,) * len(ctx.needs_input_grad)
-        values = dict(zip(ctx.names, ctx.saved_tensors, strict=True))
-        wanted = list(itertools.compress(ctx.names, ctx.needs_input_grad[2:]))
-        found = backward(ctx.spec, ctx.ticket, values, image_grad, wanted)
-        return None, None, *map(found.get, ctx.names)
+        scenes = _by_scene(ctx.names, ctx.saved_tensors)
+        needed = _by_scene(ctx.names, ctx.needs_input_grad[2:])
+        wanted = [[name for name, is_needed in own.items() if is_needed] for own in needed]
+        found = backward_all(ctx.passes, scenes, image_grads, wanted)
+        gradients = (map(own.get, names) for own, names in zip(found, ctx.names, strict=True))
+        return None, None, *itertools.chain.from_iterable(gradients)
+
+
+def _by_scene(names: Sequence[tuple[str, ...]], values: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return what belongs to each scene, by name."""
+    rest = iter(values)
+    return [dict(zip(own, rest)) for own in names]  # noqa: B905 - the others' come after

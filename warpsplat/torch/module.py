@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import torch
 from warpsplat.fit.optimizer import units_of
 from warpsplat.fit.renderers import renderer_of
 from warpsplat.fit.settings import Settings
-from warpsplat.scene import Scene
+from warpsplat.scene import ATTRIBUTES, Scene
 from warpsplat.scene.scene import check_scene
 from warpsplat.svg.write import write_svg
 from warpsplat.torch.function import render
@@ -79,10 +80,17 @@ class Module(torch.nn.Module):
     @torch.no_grad()
     def project(self) -> None:
         """Clamp every attribute to its bounds, as a run does after each step."""
-        units = units_of(Settings(), self._layout.canvas)
         for name, parameter in self.named_parameters():
-            low, high = (value * units[unit] for value, unit in (TABLE[name].low, TABLE[name].high))
-            parameter.clamp_(low, high)
+            parameter.clamp_(*self._bounds[name])
+
+    @functools.cached_property
+    def _bounds(self) -> dict[str, tuple[float, float]]:
+        """The least and the largest value of each attribute."""
+        units = units_of(Settings(), self._layout.canvas)
+        return {
+            name: (low * units[low_unit], high * units[high_unit])
+            for name, ((low, low_unit), (high, high_unit)) in ((a.name, (a.low, a.high)) for a in ATTRIBUTES)
+        }
 
     def scene(self) -> Scene:
         """Return the scene of the current parameters."""

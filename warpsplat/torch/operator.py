@@ -7,8 +7,9 @@ from typing import Any
 
 import torch
 
-from warpsplat.torch.engine import RenderSpec, check_memory
-from warpsplat.torch.passes import backward, forward, restored
+from warpsplat.torch.engine import RenderSpec
+from warpsplat.torch.kept import check_memory
+from warpsplat.torch.passes import backward, forward, images_for, restored
 from warpsplat.torch.tensors import WITHOUT_GRADIENT, SceneTensors
 
 Tensor = torch.Tensor
@@ -39,8 +40,8 @@ def render(values: Sequence[Tensor], names: str, spec: str) -> tuple[Tensor, Ten
         spec: key in ``specs``.
     """
     check_memory(specs[spec])
-    done = forward(specs[spec], _scene(values, names, spec).drawn())
-    return done.image, done.state()
+    image = images_for(specs[spec])
+    return image, forward(specs[spec], _scene(values, names, spec).drawn(), image).state()
 
 
 @render.register_fake
@@ -62,7 +63,7 @@ def render_backward(
     scene = _scene(values, names, spec)
     drawn = scene.drawn()
     wanted = [name for name in scene.values if name in drawn and name not in WITHOUT_GRADIENT]
-    found = backward(*restored(specs[spec], state), drawn, image_grad, wanted)
+    found = backward(restored(specs[spec], state), drawn, image_grad, wanted)
     return [
         found[name].to(value.dtype) if name in found else torch.zeros_like(value)
         for name, value in scene.values.items()

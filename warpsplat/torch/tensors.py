@@ -128,7 +128,8 @@ def extremes(values: Iterable[torch.Tensor]) -> list[tuple[float, float]]:
     """
     filled = (value.detach() if value.numel() else value.new_zeros(1) for value in values)
     each = [end for value in filled for end in value.aminmax()]
-    ends = torch.stack(each).tolist() if each else []
+    on_host = all(end.is_cpu for end in each)
+    ends = [end.item() for end in each] if on_host else torch.stack(each).tolist()
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from warpsplat.torch.engine import RenderSpec
-from warpsplat.torch.passes import backward, forward, restored
+from warpsplat.torch.passes import backward, forward, images_for, restored
 
 Tensor = torch.Tensor
 
@@ -25,8 +25,8 @@ class Transformed(torch.autograd.Function):
     @staticmethod
     def forward(spec: RenderSpec, names: Names, *values: Tensor) -> tuple[Tensor, Tensor]:
         """Render."""
-        done = forward(spec, dict(zip(names, values, strict=True)))
-        return done.image, done.state()
+        image = images_for(spec)
+        return image, forward(spec, dict(zip(names, values, strict=True)), image).state()
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, Tensor]) -> None:
@@ -59,8 +59,7 @@ class Gradients(torch.autograd.Function):
         spec: RenderSpec, names: Names, wanted: Names, image_grad: Tensor, state: Tensor, *values: Tensor
     ) -> tuple[Tensor, ...]:
         """Return the gradients."""
-        spec, ticket = restored(spec, state)
-        found = backward(spec, ticket, dict(zip(names, values, strict=True)), image_grad, wanted)
+        found = backward(restored(spec, state), dict(zip(names, values, strict=True)), image_grad, wanted)
         return tuple(found[name] for name in wanted)
 
     @staticmethod

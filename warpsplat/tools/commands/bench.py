@@ -77,17 +77,41 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option(
     "--seed", type=click.IntRange(0, 2**32 - 1), default=0, metavar="N", help="Seed of the random scene."
 )
+@click.option(
+    "--against",
+    metavar="OTHER",
+    show_default=False,
+    help="Compare with another device, another Python's warpsplat, or the one in another folder, in turn.",
+)
+@click.option(
+    "--rounds", type=click.IntRange(2, 1000), default=5, metavar="N", help="Rounds of each, with --against."
+)
 @click.option("--torch", "through_torch", is_flag=True, help="Also time the passes through PyTorch.")
 @click.option("-v", "--verbose", count=True, show_default=False, help="Also list the kernels.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
-    """Time a training step and its stages on a random scene.
+    r"""Time a training step and its stages on a random scene.
 
     Shapes have uniform centres and radii of 5 to 10 % of the width (half of
     that on canvases wider than 2000 px): closed outlines of 4 cubics on a
     jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves.
+
+    \b
+    warpsplat bench --against cuda:0
+    warpsplat bench --against /other/venv/bin/python
     """
     width, height = parse_size(size)
+    if options["against"]:
+        from warpsplat.tools.against import compare, sides
+        from warpsplat.tools.against import table as compared
+
+        names = ("curves", "kind", "renderer", "opacity", "repeats", "seed")
+        given = [part for name in names for part in (f"--{name}", str(options[name]))]
+        given += ["--size", size, *(["--threads", str(threads)] if threads else [])]
+        given += ["--torch"] * options["through_torch"]
+        found = compare(sides(options["against"], device), given, options["rounds"])
+        echo(json.dumps(found) if as_json else compared(found))
+        return
     from warpsplat.rendering.backend import Backend
     from warpsplat.rendering.device import choose_device, start_warp
     from warpsplat.tools.bench import bench, bench_scene
