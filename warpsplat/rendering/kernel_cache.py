@@ -1,17 +1,13 @@
 """Loading compiled kernels from Warp's cache, even if that is damaged or cannot be written.
 
-Warp trusts its cache: a file that was cut short or changed since makes every later run fail, or run wrong
-code. Here a file of checksums is kept beside each module's files. It is written when a module is first
-loaded, so earlier damage is found only if the file cannot be loaded at all.
+Warp trusts its cache: a file that was cut short, as when a machine crashes, makes every later run fail. Here
+what cannot be loaded is compiled again, once.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
-import errno
-import hashlib
-import json
 import logging
 import os
 import shutil
@@ -32,21 +28,15 @@ from warpsplat.rendering.cuda import OUT_OF_MEMORY, called, cuda_error
 
 log = logging.getLogger(__name__)
 
-CHECKSUMS = "warpsplat.sha256.json"
-"""File name -> SHA-256, beside the files of a module."""
-
 BINARIES = (".o", ".cubin", ".ptx")
 """Suffixes of compiled modules."""
-
-LOADED = (*BINARIES, ".meta")
-"""Suffixes of the files that Warp loads."""
 
 _temporary: list[str] = []
 """The folder that replaces an unusable cache while this process lives."""
 
 
 def load(kernel: wp.Kernel, device: wp.Device) -> None:
-    """Load a kernel's module, compiled if necessary. What is damaged in the cache is compiled again.
+    """Load a kernel's module, compiled if necessary. What cannot be loaded from the cache is compiled again.
 
     Raises:
         DeviceError: it cannot be compiled for the device, or loaded.
@@ -68,9 +58,6 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
     """Load a module unless it is loaded; again if files may be damaged, or another folder may hold them."""
     while (None if device.is_cpu else device.context, block_dim) not in module.execs:
         files = _Files.of(module, device, block_dim)
-        if damaged(files.folder) and not _discard(files.folder) and not _temporary:
-            use_temporary_folder(OSError(errno.EROFS, "holds damaged files and cannot be written"))
-            continue
         cached = files.exist()
         try:
             if not cached:
@@ -84,14 +71,12 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
             if explain(error)[0].startswith("not enough memory"):
                 raise
             lacking = device.is_cuda and cuda_error()[0] == OUT_OF_MEMORY
-            suspect = cached and not lacking and not files.are_known()
+            suspect = cached and not lacking
             if suspect and _discard(files.folder):
                 continue
             if _temporary or not (suspect or isinstance(error, OSError)):
                 raise _failure(error, device, compiled=files.exist()) from error
             use_temporary_folder(error)
-        else:
-            _record(files.folder)
 
 
 @dataclass(frozen=True)
@@ -112,12 +97,6 @@ class _Files:
     def exist(self) -> bool:
         """Return whether there is nothing to compile."""
         return self.binary.exists() and self.meta.exists()
-
-    def are_known(self) -> bool:
-        """Return whether an earlier run could load them, as long as they are not ``damaged``."""
-        with contextlib.suppress(OSError, ValueError):
-            return self.binary.name in json.loads((self.folder / CHECKSUMS).read_bytes())
-        return False
 
 
 def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exception:
@@ -189,40 +168,6 @@ def use_temporary_folder(failure: BaseException | None) -> None:
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     _temporary.append(made)
     wp.config.kernel_cache_dir = made
-
-
-def _checksums(folder: Path) -> dict[str, str]:
-    return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.iterdir())
-        if path.suffix in LOADED
-    }
-
-
-def damaged(folder: Path) -> bool:
-    """Return whether files in a module's folder differ from those that were loaded before."""
-    try:
-        noted = json.loads((folder / CHECKSUMS).read_bytes())
-        found = _checksums(folder)
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    except (OSError, ValueError):
-        return True
-    return not isinstance(noted, dict) or any(noted.get(name, sum_) != sum_ for name, sum_ in found.items())
-
-
-def _record(folder: Path) -> None:
-    """Write the checksums of loaded files; existing ones are kept."""
-    with contextlib.suppress(OSError, ValueError):
-        path = folder / CHECKSUMS
-        found = _checksums(folder)
-        noted = json.loads(path.read_bytes()) if path.exists() else {}
-        if found.keys() <= noted.keys():
-            return
-        handle, name = tempfile.mkstemp(dir=folder, suffix=".tmp")
-        with os.fdopen(handle, "w") as file:
-            json.dump({**found, **noted}, file)
-        os.replace(name, path)
 
 
 def _discard(folder: Path) -> bool:
