@@ -154,7 +154,7 @@ def test_what_another_processor_left_is_compiled_anew_by_the_compiler(
     own = find(cache, ".o")
     own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
     assert doubles()
-    assert compiled == ["warpsplat compiler"] * 2
+    assert [name.split()[:2] for name in compiled] == [["warpsplat", "compiler"]] * 2
     assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
 
 
@@ -165,8 +165,8 @@ from warpsplat.rendering import kernel_cache
 from warpsplat.rendering.device import choose_device, start_warp
 
 start_warp()
-compile_by = kernel_cache.compile_by
-kernel_cache.compile_by = lambda work: (print("compiled"), compile_by(work))
+compile_later = kernel_cache.compile_later
+kernel_cache.compile_later = lambda work: print("compiled") or compile_later(work)
 for name in sys.argv[1:]:
     kernel_cache.load(lanes.lane_sums, choose_device(name))
     print(name)

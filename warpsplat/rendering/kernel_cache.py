@@ -1,5 +1,8 @@
 """Loading compiled kernels from Warp's cache, even if that is damaged or cannot be written.
 
+Modules that are not in the cache are compiled side by side: what will be launched is announced (``expect``),
+and compiled when the first of it is needed, or before (``compile_expected``).
+
 Warp trusts its cache: a file that was cut short, as when a machine crashes, makes every later run fail. Here
 what cannot be loaded is compiled again, once.
 """
@@ -8,22 +11,29 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import logging
 import os
 import shutil
 import tempfile
 import threading
+import time
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import warp as wp
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 from warpsplat.errors import DeviceError, ResourceError, cause_of, explain
 from warpsplat.native import messages_hidden
-from warpsplat.rendering.compiler import compile_by
+from warpsplat.rendering.compiler import compile_later, wait_for
 from warpsplat.rendering.cuda import OUT_OF_MEMORY, called, cuda_error
 
 log = logging.getLogger(__name__)
@@ -35,37 +45,66 @@ _temporary: list[str] = []
 """The folder that replaces an unusable cache while this process lives."""
 
 
+_expected: list[_Build] = []
+"""What was announced and is not yet being compiled."""
+
+_builds: dict[Path, Future[None]] = {}
+"""What is being compiled, by the files that it makes."""
+
+_loading = threading.RLock()
+"""One thread at a time loads, or asks for modules to be compiled."""
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_builds.clear)  # the threads that compile are the parent's
+
+
+def expect(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Announce that a kernel will be needed."""
+    build = _Build.of(kernel, device)
+    if not build.is_loaded():
+        with _loading:
+            _expected.append(build)
+
+
+def compile_expected() -> None:
+    """Have the modules compiled that were announced and are not in the cache, without waiting for them."""
+    with _loading:
+        # All files are named first, which has to wait while Warp writes the source of a module.
+        named = {build.files(): build for build in _expected if not build.is_loaded()}
+        _expected.clear()
+        for files, build in named.items():
+            if not files.exist():
+                build.begin(files)
+
+
 def load(kernel: wp.Kernel, device: wp.Device) -> None:
-    """Load a kernel's module, compiled if necessary. What cannot be loaded from the cache is compiled again.
+    """Load a kernel's module, compiled if necessary, with all others that were announced.
+
+    What cannot be loaded from the cache is compiled again.
 
     Raises:
         DeviceError: it cannot be compiled for the device, or loaded.
         ResourceError: neither the cache nor a temporary folder can hold compiled kernels.
     """
-    module = kernel.module
-    block_dim = 1 if device.is_cpu else module.options["block_dim"]
-    if (None if device.is_cpu else device.context, block_dim) in module.execs:
+    build = _Build.of(kernel, device)
+    if build.is_loaded():
         return
     with _loading:
-        _load(module, device, block_dim)
+        _load(build)
 
 
-_loading = threading.RLock()
-"""One thread at a time compiles or loads."""
-
-
-def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
+def _load(build: _Build) -> None:
     """Load a module unless it is loaded; again if files may be damaged, or another folder may hold them."""
-    while (None if device.is_cpu else device.context, block_dim) not in module.execs:
-        files = _Files.of(module, device, block_dim)
+    module, device = build.module, build.device
+    while not build.is_loaded():
+        files = build.files()
         cached = files.exist()
         try:
             if not cached:
-                with alone_with(files.folder):
-                    if not files.exist():
-                        compile_by(lambda: wp.load_module(module, device, block_dim=block_dim))
+                wait_for(functools.partial(_begin, build, files))
             with messages_hidden():
-                wp.load_module(module, device, block_dim=block_dim)
+                wp.load_module(module, device, block_dim=build.block_dim)
         except Exception as error:  # Warp and its compiler raise exceptions of many types
             module.mark_modified()  # or Warp would remember the failure
             if explain(error)[0].startswith("not enough memory"):
@@ -79,6 +118,54 @@ def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
             use_temporary_folder(error)
 
 
+def _begin(build: _Build, files: _Files) -> Future[None]:
+    """Have a module compiled with those that were announced."""
+    begun = build.begin(files)
+    compile_expected()
+    return begun
+
+
+@dataclass(frozen=True)
+class _Build:
+    """A module to compile for a device."""
+
+    module: wp.Module
+    device: wp.Device
+    block_dim: int | None
+
+    @staticmethod
+    def of(kernel: wp.Kernel, device: wp.Device) -> _Build:
+        """Return the build with a kernel."""
+        module = kernel.module
+        return _Build(module, device, 1 if device.is_cpu else module.options["block_dim"])
+
+    def is_loaded(self) -> bool:
+        """Return whether the module is loaded."""
+        return (None if self.device.is_cpu else self.device.context, self.block_dim) in self.module.execs
+
+    def files(self) -> _Files:
+        """Return the files by Warp's names, which tell apart architectures of GPUs, and processors."""
+        folder = _place() / self.module.get_module_identifier(self.block_dim)
+        binary = self.module._get_compile_output_name(self.device, block_dim=self.block_dim)
+        return _Files(folder, folder / binary, folder / self.module._get_meta_name(block_dim=self.block_dim))
+
+    def begin(self, files: _Files) -> Future[None]:
+        """Have the module compiled, unless it is being compiled."""
+        begun = _builds.get(files.binary)
+        if begun:
+            return begun
+        options = self.module.resolved_options[self.block_dim]
+
+        def work() -> None:
+            with alone_with(files.folder):
+                if not files.exist():
+                    self.module._compile(self.device, files.folder, options=options)
+
+        _builds[files.binary] = made = compile_later(work)
+        made.add_done_callback(lambda _: _builds.pop(files.binary))
+        return made
+
+
 @dataclass(frozen=True)
 class _Files:
     """The files of a module that a device loads."""
@@ -86,13 +173,6 @@ class _Files:
     folder: Path
     binary: Path
     meta: Path
-
-    @staticmethod
-    def of(module: wp.Module, device: wp.Device, block_dim: Any) -> _Files:
-        """Return the files by Warp's names, which tell apart architectures of GPUs, and processors."""
-        folder = _place() / module.get_module_identifier(block_dim)
-        binary = module._get_compile_output_name(device, block_dim=block_dim)
-        return _Files(folder, folder / binary, folder / module._get_meta_name(block_dim=block_dim))
 
     def exist(self) -> bool:
         """Return whether there is nothing to compile."""
@@ -114,6 +194,9 @@ def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exceptio
 LOCK = "warpsplat.lock"
 """An empty file in the cache; a byte of it is locked for each module that is being compiled."""
 
+LOCK_INTERVAL = 0.02
+"""Seconds after which a lock that another process holds is tried again."""
+
 
 @contextlib.contextmanager
 def alone_with(folder: Path) -> Iterator[None]:
@@ -122,17 +205,38 @@ def alone_with(folder: Path) -> Iterator[None]:
     Other modules may be compiled meanwhile. Where locking is not possible, several processes may compile the
     same module, which Warp allows: it renames finished folders into place.
     """
-    handle = None
+    handle, place = _lock_file(folder.with_name(LOCK)), zlib.crc32(folder.name.encode())
+    is_locked = handle is not None and _lock(handle, place)
     try:
-        with contextlib.suppress(OSError, ImportError):
-            import fcntl  # POSIX only
-
-            handle = os.open(folder.with_name(LOCK), os.O_RDWR | os.O_CREAT, 0o666)
-            fcntl.lockf(handle, fcntl.LOCK_EX, 1, zlib.crc32(folder.name.encode()))
         yield
     finally:
-        if handle is not None:
-            os.close(handle)
+        if handle is not None and is_locked:
+            fcntl.lockf(handle, fcntl.LOCK_UN, 1, place)
+
+
+@functools.cache
+def _lock_file(path: Path) -> int | None:
+    """Return a descriptor that stays open: to close one ends all locks of the process on the file."""
+    with contextlib.suppress(OSError):
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666) if fcntl else None
+    return None
+
+
+def _lock(handle: int, place: int) -> bool:
+    """Wait for the lock on a byte; return False where locking is not possible.
+
+    Two processes whose threads wait for each other's locks would be refused as deadlocked if they waited
+    within the system.
+    """
+    while True:
+        try:
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+        except (BlockingIOError, PermissionError):
+            time.sleep(LOCK_INTERVAL)
+        except OSError:
+            return False
+        else:
+            return True
 
 
 def _place() -> Path:
