@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import zlib
 from collections.abc import Iterator
@@ -18,9 +19,10 @@ import warp as wp
 from tests import fake_cuda
 from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
-from warpsplat.rendering import kernel_cache
+from warpsplat.rendering import compiler, kernel_cache
+from warpsplat.rendering.compiler import compiler_finished
 from warpsplat.rendering.cuda import runtime
-from warpsplat.rendering.kernel_cache import LOCK, alone_with, load
+from warpsplat.rendering.kernel_cache import LOCK, alone_with, compile_expected, expect, load
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
@@ -29,6 +31,12 @@ wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own p
 def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
     i = wp.tid()
     values[i] = values[i] * 2.0
+
+
+@wp.kernel(module="unique", module_options=constants.MODULE_OPTIONS)  # type: ignore[untyped-decorator]
+def _negate(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
+    i = wp.tid()
+    values[i] = -values[i]
 
 
 CPU = wp.get_device("cpu")
@@ -130,6 +138,10 @@ def test_a_module_is_compiled_by_one_process(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [LOCK]
     with alone_with(tmp_path / "none" / "wp_one"):
         pass
+    with alone_with(tmp_path / "wp_one"):
+        with alone_with(tmp_path / "wp_other"):
+            pass
+        assert is_held("wp_one"), "of two locks of a process, one is left"
 
 
 @pytest.fixture
@@ -158,10 +170,80 @@ def test_what_another_processor_left_is_compiled_anew_by_the_compiler(
     assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
 
 
+def test_what_was_announced_is_compiled_with_what_is_needed(cache: Path, compiled: list[str]) -> None:
+    _negate.module.unload()
+    expect(_negate, CPU)
+    assert compiled == []
+    assert doubles()
+    assert compiler_finished() and len(compiled) == 2
+    load(_negate, CPU)
+    assert len(compiled) == 2
+
+
+def test_headers_are_precompiled_once(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take longer than all kernels of a step."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr(compiler, "available_cores", lambda: 2)
+    compiler._compiler.cache_clear()
+    _negate.module.unload()
+    expect(_negate, CPU)
+    assert doubles() and compiler_finished()
+    compiler._compiler.cache_clear()
+    assert len(list(folder.rglob("*.pch"))) == 1
+
+
+def test_what_is_compiled_before_it_is_needed_may_fail(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is compiled again then, to say why."""
+    with monkeypatch.context() as patch:
+        patch.setattr(wp._src.build, "build_cpu", None)
+        expect(_double, CPU)
+        compile_expected()
+        compiler_finished()
+    assert doubles()
+
+
+TWO = """
+import sys
+from warpsplat.kernels import lanes
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.kernel_cache import load
+
+start_warp()
+import warp._src.build as build
+build_cpu = build.build_cpu
+build.build_cpu = lambda *arguments, **named: (print("compiled"), build_cpu(*arguments, **named))
+load(lanes.lane_sums, choose_device("cpu"))
+print("loaded")
+"""
+
+
+@pytest.mark.slow
+def test_two_processes_share_the_work(tmp_path: Path) -> None:
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", TWO],
+            env=os.environ | {"WARP_CACHE_PATH": str(tmp_path)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    said = sorted(process.communicate()[0].split() for process in both)
+    if sys.platform == "win32":
+        assert all("loaded" in words for words in said)
+    else:
+        assert said == [["compiled", "loaded"], ["loaded"]]
+    place = find(tmp_path, ".o").parent
+    assert {path.name for path in place.parent.iterdir()} == {place.name, LOCK}
+
+
 DEVICES = """
 import sys
 from warpsplat.kernels import lanes
-from warpsplat.rendering import kernel_cache
+from warpsplat.rendering import compiler, kernel_cache
+from warpsplat.rendering.compiler import compiler_finished
 from warpsplat.rendering.device import choose_device, start_warp
 
 start_warp()

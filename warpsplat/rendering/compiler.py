@@ -104,8 +104,11 @@ def wait_for(ask: Callable[[], Future[None]]) -> None:
             seconds = compiler.seconds + time.monotonic() - started
             log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
         compiler.seconds += time.monotonic() - started
+        error = future.exception()
+        if error:
+            compiler.finish()  # other modules are likely to fail as well, which is not to be seen
     log.info("", extra={PASSING: True})
-    error, cause = future.exception(), first_error(said)
+    cause = first_error(said)
     if cause and isinstance(error, Exception) and not isinstance(error, (OSError, MemoryError)):
         raise BuildError(cause) from error
     future.result()
