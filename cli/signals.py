@@ -73,6 +73,8 @@ def leave_compiler(code: int) -> None:
     """Exit now if kernels are being compiled that take longer: the compiler cannot be stopped."""
     compiler = sys.modules.get("warpsplat.rendering.compiler")
     if compiler and not compiler.compiler_finished(COMPILER_TIME):
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
         _exit(code)
 
 

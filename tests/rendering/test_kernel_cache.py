@@ -9,6 +9,7 @@ import tempfile
 import threading
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import wait
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from tests import fake_cuda
 from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
 from warpsplat.rendering import compiler, kernel_cache
-from warpsplat.rendering.compiler import compiler_finished
 from warpsplat.rendering.cuda import runtime
 from warpsplat.rendering.kernel_cache import LOCK, alone_with, compile_expected, expect, load
 
@@ -175,7 +175,8 @@ def test_what_was_announced_is_compiled_with_what_is_needed(cache: Path, compile
     expect(_negate, CPU)
     assert compiled == []
     assert doubles()
-    assert compiler_finished() and len(compiled) == 2
+    wait(list(kernel_cache._builds.values()))
+    assert len(compiled) == 2
     load(_negate, CPU)
     assert len(compiled) == 2
 
@@ -189,7 +190,8 @@ def test_headers_are_precompiled_once(cache: Path, tmp_path: Path, monkeypatch: 
     compiler._compiler.cache_clear()
     _negate.module.unload()
     expect(_negate, CPU)
-    assert doubles() and compiler_finished()
+    assert doubles()
+    wait(list(kernel_cache._builds.values()))
     compiler._compiler.cache_clear()
     assert len(list(folder.rglob("*.pch"))) == 1
 
@@ -200,8 +202,9 @@ def test_what_is_compiled_before_it_is_needed_may_fail(cache: Path, monkeypatch:
         patch.setattr(wp._src.build, "build_cpu", None)
         expect(_double, CPU)
         compile_expected()
-        compiler_finished()
-    assert doubles()
+        assert wait(list(kernel_cache._builds.values())).done
+    load(_double, CPU)
+    assert find(cache, ".o")
 
 
 TWO = """
@@ -243,7 +246,6 @@ DEVICES = """
 import sys
 from warpsplat.kernels import lanes
 from warpsplat.rendering import compiler, kernel_cache
-from warpsplat.rendering.compiler import compiler_finished
 from warpsplat.rendering.device import choose_device, start_warp
 
 start_warp()

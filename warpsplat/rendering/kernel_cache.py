@@ -103,6 +103,7 @@ def _load(build: _Build) -> None:
         try:
             if not cached:
                 wait_for(functools.partial(_begin, build, files))
+                module.mark_modified()  # or Warp would remember that it failed before it was waited for
             with messages_hidden():
                 wp.load_module(module, device, block_dim=build.block_dim)
         except Exception as error:  # Warp and its compiler raise exceptions of many types
