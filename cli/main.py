@@ -152,7 +152,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = report_error(error, json_stream(given))
     if Interrupt.received:
         code = 128 + Interrupt.received
-        leave_compiler(code)
+    leave_compiler(int(code or 0))
     sys.exit(int(code or 0))
 
 

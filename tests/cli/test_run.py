@@ -102,7 +102,7 @@ def test_the_bar_weighs_steps_and_shows_no_decibels_that_fall() -> None:
 @pytest.mark.slow
 def test_compiling_is_said_on_a_terminal_or_with_v(image: Path, tmp_path: Path) -> None:
     options = ("vectorize", image, "-o", image.parent / "a.svg", *QUICK, "--iterations", 1)
-    code = "import warp; warp.load_module = lambda *_, **__: exit(9)\n"
+    code = "from warp._src.context import Module; Module._compile = lambda *_, **__: exit(9)\n"
     code += f"from warpsplat.cli.main import main; main({[str(o) for o in options]!r} + ARGS)"
     for arguments, said in (([], False), (["-v"], True)):
         done = subprocess.run(

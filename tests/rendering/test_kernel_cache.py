@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import wait
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,9 @@ import warp as wp
 from tests import fake_cuda
 from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
-from warpsplat.rendering import kernel_cache
+from warpsplat.rendering import compiler, kernel_cache
 from warpsplat.rendering.cuda import runtime
-from warpsplat.rendering.kernel_cache import CHECKSUMS, LOCK, alone_with, load
+from warpsplat.rendering.kernel_cache import LOCK, alone_with, compile_expected, expect, load
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
@@ -29,6 +31,12 @@ wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own p
 def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
     i = wp.tid()
     values[i] = values[i] * 2.0
+
+
+@wp.kernel(module="unique", module_options=constants.MODULE_OPTIONS)  # type: ignore[untyped-decorator]
+def _negate(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
+    i = wp.tid()
+    values[i] = -values[i]
 
 
 CPU = wp.get_device("cpu")
@@ -56,35 +64,22 @@ def doubles() -> bool:
 
 
 def find(cache: Path, ending: str) -> Path:
-    (path,) = (p for p in cache.rglob(f"*{ending}") if p.name != CHECKSUMS)
+    (path,) = cache.rglob(f"*{ending}")
     return path
 
 
-def halve(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-
-
 @pytest.mark.slow
-def test_a_damaged_cache_is_rebuilt(cache: Path) -> None:
-    """Files that are cut short, empty, or have other bytes."""
+@pytest.mark.parametrize("ending", [".o", ".meta"])
+def test_a_damaged_cache_is_rebuilt(cache: Path, ending: str) -> None:
+    """Files that are cut short, or empty."""
     assert doubles()
     good = find(cache, ".o").read_bytes()
-    for ending in (".o", ".meta"):
-        whole = find(cache, ending).read_bytes()
-        third = len(whole) // 3
-        for damaged in (whole[: 2 * third], b"", whole[:third] + bytes(third) + whole[2 * third :]):
-            find(cache, ending).write_bytes(damaged)
-            assert doubles(), (ending, len(damaged))
-            assert find(cache, ".o").read_bytes() == good
+    whole = find(cache, ending).read_bytes()
+    for size in (0, 1, len(whole) // 2, len(whole) - 1):
+        find(cache, ending).write_bytes(whole[:size])
+        assert doubles(), size
+        assert find(cache, ".o").read_bytes() == good
     assert len(list(cache.glob("wp_*"))) == 1, "what was damaged is gone"
-
-
-def test_damage_from_before_the_checksums_is_found_where_it_shows(cache: Path) -> None:
-    assert doubles()
-    for ending in (".o", ".meta"):
-        (find(cache, ".o").parent / CHECKSUMS).unlink()
-        halve(find(cache, ending))
-        assert doubles()
 
 
 def test_a_whole_cache_is_used_as_it_is(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,6 +138,10 @@ def test_a_module_is_compiled_by_one_process(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [LOCK]
     with alone_with(tmp_path / "none" / "wp_one"):
         pass
+    with alone_with(tmp_path / "wp_one"):
+        with alone_with(tmp_path / "wp_other"):
+            pass
+        assert is_held("wp_one"), "of two locks of a process, one is left"
 
 
 @pytest.fixture
@@ -167,19 +166,91 @@ def test_what_another_processor_left_is_compiled_anew_by_the_compiler(
     own = find(cache, ".o")
     own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
     assert doubles()
-    assert compiled == ["warpsplat compiler"] * 2
+    assert [name.split()[:2] for name in compiled] == [["warpsplat", "compiler"]] * 2
     assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
+
+
+def test_what_was_announced_is_compiled_with_what_is_needed(cache: Path, compiled: list[str]) -> None:
+    _negate.module.unload()
+    expect(_negate, CPU)
+    assert compiled == []
+    assert doubles()
+    wait(list(kernel_cache._builds.values()))
+    assert len(compiled) == 2
+    load(_negate, CPU)
+    assert len(compiled) == 2
+
+
+def test_headers_are_precompiled_once(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take longer than all kernels of a step."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr(compiler, "available_cores", lambda: 2)
+    compiler._compiler.cache_clear()
+    _negate.module.unload()
+    expect(_negate, CPU)
+    assert doubles()
+    wait(list(kernel_cache._builds.values()))
+    compiler._compiler.cache_clear()
+    assert len(list(folder.rglob("*.pch"))) == 1
+
+
+def test_what_is_compiled_before_it_is_needed_may_fail(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is compiled again then, to say why."""
+    with monkeypatch.context() as patch:
+        patch.setattr(wp._src.build, "build_cpu", None)
+        expect(_double, CPU)
+        compile_expected()
+        assert wait(list(kernel_cache._builds.values())).done
+    load(_double, CPU)
+    assert find(cache, ".o")
+
+
+TWO = """
+import sys
+from warpsplat.kernels import lanes
+from warpsplat.rendering.device import choose_device, start_warp
+from warpsplat.rendering.kernel_cache import load
+
+start_warp()
+import warp._src.build as build
+build_cpu = build.build_cpu
+build.build_cpu = lambda *arguments, **named: (print("compiled"), build_cpu(*arguments, **named))
+load(lanes.lane_sums, choose_device("cpu"))
+print("loaded")
+"""
+
+
+@pytest.mark.slow
+def test_two_processes_share_the_work(tmp_path: Path) -> None:
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", TWO],
+            env=os.environ | {"WARP_CACHE_PATH": str(tmp_path)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    said = sorted(process.communicate()[0].split() for process in both)
+    if sys.platform == "win32":
+        assert all("loaded" in words for words in said)
+    else:
+        assert said == [["compiled", "loaded"], ["loaded"]]
+    place = find(tmp_path, ".o").parent
+    assert {path.name for path in place.parent.iterdir()} == {place.name, LOCK}
 
 
 DEVICES = """
 import sys
 from warpsplat.kernels import lanes
-from warpsplat.rendering import kernel_cache
+from warpsplat.rendering import compiler, kernel_cache
 from warpsplat.rendering.device import choose_device, start_warp
 
 start_warp()
-compile_by = kernel_cache.compile_by
-kernel_cache.compile_by = lambda work: (print("compiled"), compile_by(work))
+compile_later = kernel_cache.compile_later
+kernel_cache.compile_later = lambda work: print("compiled") or compile_later(work)
 for name in sys.argv[1:]:
     kernel_cache.load(lanes.lane_sums, choose_device(name))
     print(name)
@@ -228,7 +299,7 @@ def test_a_module_that_cannot_be_loaded_although_it_is_whole(
             DeviceError, match=r"kernels cannot be loaded on the CPU: Failed to load CPU module"
         ):
             doubles()
-    assert find(cache, ".o").read_bytes() == good, "it was loaded before, so that it is not damaged"
+    assert find(cache, ".o").read_bytes() == good, "compiled again, in case that it was damaged"
     assert doubles()
 
 

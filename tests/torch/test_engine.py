@@ -55,7 +55,7 @@ def test_scenes_of_one_structure_share_an_engine(engines: int, change: Callable[
 
 def test_changing_scenes_do_not_compile(monkeypatch: pytest.MonkeyPatch) -> None:
     step(random_scene(Kind.FILL, 2))
-    monkeypatch.setattr(kernel_cache, "compile_by", None)
+    monkeypatch.setattr(kernel_cache, "compile_later", None)
     monkeypatch.setattr(kept, "KEPT", 3)
     for count in range(3, 8):
         step(random_scene(Kind.FILL, count))

@@ -27,7 +27,7 @@ from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
-from warpsplat.scene import FloatArray, Scene
+from warpsplat.scene import FloatArray, Kind, Scene
 from warpsplat.scene.simple import simple
 from warpsplat.svg.write import rounded
 
@@ -66,6 +66,10 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     A draft, which is not tidied, is the trace, and needs no Warp.
     """
     settings, limit = problem.settings, problem.settings.max_bytes
+    if settings.tidy:
+        from warpsplat.drawing.kernels import compile_meanwhile
+
+        compile_meanwhile(Kind.FILL, run.backend)
     most = None if settings.simplify else settings.curves
     picture, price = Picture.of(problem.target, is_soft=settings.optics == "none"), byte_price(settings)
     announce_trace(picture, settings)

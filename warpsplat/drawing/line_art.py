@@ -10,6 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.junctions import with_junctions
+from warpsplat.drawing.kernels import compile_meanwhile
 from warpsplat.drawing.prices import CUBIC, LEVEL, MOVE, NUMBER, worth
 from warpsplat.drawing.strokes.broad import BROAD, disc_cover, pen_width
 from warpsplat.drawing.strokes.ink import Ink, find_ink
@@ -55,6 +56,7 @@ def draw_lines(problem: Problem, run: Run) -> Fit:
     Raises:
         ImageError: there is no ink.
     """
+    compile_meanwhile(Kind.STROKE, run.backend)
     across, down = margins(problem.target, THIN_SIDE)
     width = float(problem.settings.width) if problem.settings.width else None
     problem = replace(problem, target=continued(problem.target, across, down))

@@ -96,12 +96,24 @@ class Step:
         image = (target.image, self.renderer.backend, target.viewport, target.weights, target.loss)
         self.loss_target = loss_target or LossTarget(*image)
         self._level_target = LossTarget(*image) if levels else self.loss_target
-        for renderer in self.renderers if capacity is None else self.level_renderers:
-            renderer.forward_complete()
-        self.record()
+        if settings.density.interval:
+            self.renderer.expect_removal_costs()
+        self._prepare()  # before the first launch runs, so that all kernels are compiled side by side
+        unsized = self.renderers if capacity is None else self.level_renderers
+        if any([renderer.forward_complete() for renderer in unsized]):
+            self._prepare()
+        self.replay = self._replay()
 
     def record(self) -> None:
         """Record the launches for the arrays and settings as they are now."""
+        self._prepare()
+        self.replay = self._replay()
+
+    def _replay(self) -> Replay:
+        return Replay(self.renderer.backend.device, self.programs, captured=not self.target.loss)
+
+    def _prepare(self) -> None:
+        """Make the programs."""
         self.renderer.check_current()
         backend, state = self.renderer.backend, self.state
         inputs = LossInputs(self.renderer, self.loss_target, self.settings, state.clock)
@@ -126,7 +138,6 @@ class Step:
             *(program for level in levels for program in level_programs(level, state.parameters)),
             update,
         )
-        self.replay = Replay(backend.device, self.programs, captured=not self.target.loss)
 
     def advance(self) -> None:
         """Do the step. Nothing is allocated or read back."""

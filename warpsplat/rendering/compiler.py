@@ -1,7 +1,8 @@
-"""The thread that compiles kernels, and the messages meanwhile."""
+"""The threads that compile kernels, and the messages meanwhile."""
 
 from __future__ import annotations
 
+import atexit
 import functools
 import logging
 import os
@@ -11,7 +12,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 
-from warpsplat.native import messages_hidden
+from warpsplat.native import available_cores, messages_hidden
+from warpsplat.rendering.headers import SharedHeaders
 
 log = logging.getLogger(__name__)
 
@@ -27,38 +29,43 @@ class BuildError(Exception):
 
 
 class _Compiler:
-    """One thread for all modules of a process.
-
-    Warp precompiles its headers again in each thread that compiles, which takes as long as a dozen small
-    modules.
-    """
+    """Threads that compile modules side by side, one for each core; the compiler releases Python's lock."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
         """Time that the process has waited for all modules so far."""
-        self._latest: Future[None] | None = None
+        self._unfinished: set[Future[None]] = set()
         self._tasks: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
-        threading.Thread(target=self._serve, name="warpsplat compiler", daemon=True).start()
+        self._headers = SharedHeaders()
+        for number in range(1, available_cores() + 1):
+            name = f"warpsplat compiler {number}"
+            threading.Thread(target=self._serve, name=name, daemon=True).start()
 
     def _serve(self) -> None:
         while True:
             work, future = self._tasks.get()
+            if not future.set_running_or_notify_cancel():
+                continue
             try:
                 work()
             except BaseException as error:  # raised again where it is waited for
                 future.set_exception(error)
             else:
                 future.set_result(None)
+            finally:
+                self._headers.done()
 
     def ask(self, work: Callable[[], None]) -> Future[None]:
         """Queue ``work`` behind earlier requests."""
-        self._latest = future = Future[None]()
+        future = Future[None]()
+        self._unfinished.add(future)
+        future.add_done_callback(self._unfinished.discard)
         self._tasks.put((work, future))
         return future
 
-    def is_busy(self) -> bool:
-        """Return whether work is left, e.g. that of a caller who was interrupted."""
-        return self._latest is not None and not self._latest.done()
+    def finish(self, timeout: float | None = None) -> bool:
+        """Drop the work that has not begun, and wait for the rest; return whether that was in time [s]."""
+        return not wait([left for left in list(self._unfinished) if not left.cancel()], timeout).not_done
 
 
 @functools.cache
@@ -77,8 +84,13 @@ def _announce() -> None:
     log.info("compiling kernels, which is done once and takes up to a minute")
 
 
-def compile_by(work: Callable[[], None]) -> None:
-    """Do ``work`` in the compiler's thread, so that Ctrl-C need not wait for it; log how long it takes.
+def compile_later(work: Callable[[], None]) -> Future[None]:
+    """Have ``work`` done by the compiler's threads, behind what they were asked for before."""
+    return _compiler().ask(work)
+
+
+def wait_for(ask: Callable[[], Future[None]]) -> None:
+    """Wait for what ``ask`` returns, so that Ctrl-C need not wait for the compiler; log how long it takes.
 
     Raises:
         BuildError: it failed, and native code said why.
@@ -87,13 +99,16 @@ def compile_by(work: Callable[[], None]) -> None:
     compiler = _compiler()
     with messages_hidden() as said:
         started = time.monotonic()
-        future = compiler.ask(work)
+        future = ask()
         while not wait([future], MESSAGE_INTERVAL).done:
             seconds = compiler.seconds + time.monotonic() - started
             log.info("compiling kernels: %d s", seconds, extra={PASSING: True})
         compiler.seconds += time.monotonic() - started
+        error = future.exception()
+        if error:
+            compiler.finish()  # other modules are likely to fail as well, which is not to be seen
     log.info("", extra={PASSING: True})
-    error, cause = future.exception(), first_error(said)
+    cause = first_error(said)
     if cause and isinstance(error, Exception) and not isinstance(error, (OSError, MemoryError)):
         raise BuildError(cause) from error
     future.result()
@@ -110,6 +125,12 @@ def compile_seconds() -> float:
     return _compiler().seconds if _compiler.cache_info().currsize else 0.0
 
 
-def compiling() -> bool:
-    """Return whether the compiler is working: a process that ends then must not remove its files."""
-    return _compiler.cache_info().currsize > 0 and _compiler().is_busy()
+def compiler_finished(timeout: float | None = None) -> bool:
+    """Drop what is not yet being compiled, and return whether the rest ends in ``timeout`` seconds.
+
+    Else a process that ends must not remove the compiler's files.
+    """
+    return not _compiler.cache_info().currsize or _compiler().finish(timeout)
+
+
+atexit.register(compiler_finished)

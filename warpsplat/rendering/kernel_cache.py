@@ -1,97 +1,170 @@
 """Loading compiled kernels from Warp's cache, even if that is damaged or cannot be written.
 
-Warp trusts its cache: a file that was cut short or changed since makes every later run fail, or run wrong
-code. Here a file of checksums is kept beside each module's files. It is written when a module is first
-loaded, so earlier damage is found only if the file cannot be loaded at all.
+Modules that are not in the cache are compiled side by side: what will be launched is announced (``expect``),
+and compiled when the first of it is needed, or before (``compile_expected``).
+
+Warp trusts its cache: a file that was cut short, as when a machine crashes, makes every later run fail. Here
+what cannot be loaded is compiled again, once.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
-import errno
-import hashlib
-import json
+import functools
 import logging
 import os
 import shutil
 import tempfile
 import threading
+import time
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import warp as wp
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 from warpsplat.errors import DeviceError, ResourceError, cause_of, explain
 from warpsplat.native import messages_hidden
-from warpsplat.rendering.compiler import compile_by
+from warpsplat.rendering.compiler import compile_later, wait_for
 from warpsplat.rendering.cuda import OUT_OF_MEMORY, called, cuda_error
 
 log = logging.getLogger(__name__)
 
-CHECKSUMS = "warpsplat.sha256.json"
-"""File name -> SHA-256, beside the files of a module."""
-
 BINARIES = (".o", ".cubin", ".ptx")
 """Suffixes of compiled modules."""
-
-LOADED = (*BINARIES, ".meta")
-"""Suffixes of the files that Warp loads."""
 
 _temporary: list[str] = []
 """The folder that replaces an unusable cache while this process lives."""
 
 
+_expected: list[_Build] = []
+"""What was announced and is not yet being compiled."""
+
+_builds: dict[Path, Future[None]] = {}
+"""What is being compiled, by the files that it makes."""
+
+_loading = threading.RLock()
+"""One thread at a time loads, or asks for modules to be compiled."""
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_builds.clear)  # the threads that compile are the parent's
+
+
+def expect(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Announce that a kernel will be needed."""
+    build = _Build.of(kernel, device)
+    if not build.is_loaded():
+        with _loading:
+            _expected.append(build)
+
+
+def compile_expected() -> None:
+    """Have the modules compiled that were announced and are not in the cache, without waiting for them."""
+    with _loading:
+        # All files are named first, which has to wait while Warp writes the source of a module.
+        named = {build.files(): build for build in _expected if not build.is_loaded()}
+        _expected.clear()
+        for files, build in named.items():
+            if not files.exist():
+                build.begin(files)
+
+
 def load(kernel: wp.Kernel, device: wp.Device) -> None:
-    """Load a kernel's module, compiled if necessary. What is damaged in the cache is compiled again.
+    """Load a kernel's module, compiled if necessary, with all others that were announced.
+
+    What cannot be loaded from the cache is compiled again.
 
     Raises:
         DeviceError: it cannot be compiled for the device, or loaded.
         ResourceError: neither the cache nor a temporary folder can hold compiled kernels.
     """
-    module = kernel.module
-    block_dim = 1 if device.is_cpu else module.options["block_dim"]
-    if (None if device.is_cpu else device.context, block_dim) in module.execs:
+    build = _Build.of(kernel, device)
+    if build.is_loaded():
         return
     with _loading:
-        _load(module, device, block_dim)
+        _load(build)
 
 
-_loading = threading.RLock()
-"""One thread at a time compiles or loads."""
-
-
-def _load(module: wp.Module, device: wp.Device, block_dim: Any) -> None:
+def _load(build: _Build) -> None:
     """Load a module unless it is loaded; again if files may be damaged, or another folder may hold them."""
-    while (None if device.is_cpu else device.context, block_dim) not in module.execs:
-        files = _Files.of(module, device, block_dim)
-        if damaged(files.folder) and not _discard(files.folder) and not _temporary:
-            use_temporary_folder(OSError(errno.EROFS, "holds damaged files and cannot be written"))
-            continue
+    module, device = build.module, build.device
+    while not build.is_loaded():
+        files = build.files()
         cached = files.exist()
         try:
             if not cached:
-                with alone_with(files.folder):
-                    if not files.exist():
-                        compile_by(lambda: wp.load_module(module, device, block_dim=block_dim))
+                wait_for(functools.partial(_begin, build, files))
+                module.mark_modified()  # or Warp would remember that it failed before it was waited for
             with messages_hidden():
-                wp.load_module(module, device, block_dim=block_dim)
+                wp.load_module(module, device, block_dim=build.block_dim)
         except Exception as error:  # Warp and its compiler raise exceptions of many types
             module.mark_modified()  # or Warp would remember the failure
             if explain(error)[0].startswith("not enough memory"):
                 raise
             lacking = device.is_cuda and cuda_error()[0] == OUT_OF_MEMORY
-            suspect = cached and not lacking and not files.are_known()
+            suspect = cached and not lacking
             if suspect and _discard(files.folder):
                 continue
             if _temporary or not (suspect or isinstance(error, OSError)):
                 raise _failure(error, device, compiled=files.exist()) from error
             use_temporary_folder(error)
-        else:
-            _record(files.folder)
+
+
+def _begin(build: _Build, files: _Files) -> Future[None]:
+    """Have a module compiled with those that were announced."""
+    begun = build.begin(files)
+    compile_expected()
+    return begun
+
+
+@dataclass(frozen=True)
+class _Build:
+    """A module to compile for a device."""
+
+    module: wp.Module
+    device: wp.Device
+    block_dim: int | None
+
+    @staticmethod
+    def of(kernel: wp.Kernel, device: wp.Device) -> _Build:
+        """Return the build with a kernel."""
+        module = kernel.module
+        return _Build(module, device, 1 if device.is_cpu else module.options["block_dim"])
+
+    def is_loaded(self) -> bool:
+        """Return whether the module is loaded."""
+        return (None if self.device.is_cpu else self.device.context, self.block_dim) in self.module.execs
+
+    def files(self) -> _Files:
+        """Return the files by Warp's names, which tell apart architectures of GPUs, and processors."""
+        folder = _place() / self.module.get_module_identifier(self.block_dim)
+        binary = self.module._get_compile_output_name(self.device, block_dim=self.block_dim)
+        return _Files(folder, folder / binary, folder / self.module._get_meta_name(block_dim=self.block_dim))
+
+    def begin(self, files: _Files) -> Future[None]:
+        """Have the module compiled, unless it is being compiled."""
+        begun = _builds.get(files.binary)
+        if begun:
+            return begun
+        options = self.module.resolved_options[self.block_dim]
+
+        def work() -> None:
+            with alone_with(files.folder):
+                if not files.exist():
+                    self.module._compile(self.device, files.folder, options=options)
+
+        _builds[files.binary] = made = compile_later(work)
+        made.add_done_callback(lambda _: _builds.pop(files.binary))
+        return made
 
 
 @dataclass(frozen=True)
@@ -102,22 +175,9 @@ class _Files:
     binary: Path
     meta: Path
 
-    @staticmethod
-    def of(module: wp.Module, device: wp.Device, block_dim: Any) -> _Files:
-        """Return the files by Warp's names, which tell apart architectures of GPUs, and processors."""
-        folder = _place() / module.get_module_identifier(block_dim)
-        binary = module._get_compile_output_name(device, block_dim=block_dim)
-        return _Files(folder, folder / binary, folder / module._get_meta_name(block_dim=block_dim))
-
     def exist(self) -> bool:
         """Return whether there is nothing to compile."""
         return self.binary.exists() and self.meta.exists()
-
-    def are_known(self) -> bool:
-        """Return whether an earlier run could load them, as long as they are not ``damaged``."""
-        with contextlib.suppress(OSError, ValueError):
-            return self.binary.name in json.loads((self.folder / CHECKSUMS).read_bytes())
-        return False
 
 
 def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exception:
@@ -135,6 +195,9 @@ def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exceptio
 LOCK = "warpsplat.lock"
 """An empty file in the cache; a byte of it is locked for each module that is being compiled."""
 
+LOCK_INTERVAL = 0.02
+"""Seconds after which a lock that another process holds is tried again."""
+
 
 @contextlib.contextmanager
 def alone_with(folder: Path) -> Iterator[None]:
@@ -143,17 +206,38 @@ def alone_with(folder: Path) -> Iterator[None]:
     Other modules may be compiled meanwhile. Where locking is not possible, several processes may compile the
     same module, which Warp allows: it renames finished folders into place.
     """
-    handle = None
+    handle, place = _lock_file(folder.with_name(LOCK)), zlib.crc32(folder.name.encode())
+    is_locked = handle is not None and _lock(handle, place)
     try:
-        with contextlib.suppress(OSError, ImportError):
-            import fcntl  # POSIX only
-
-            handle = os.open(folder.with_name(LOCK), os.O_RDWR | os.O_CREAT, 0o666)
-            fcntl.lockf(handle, fcntl.LOCK_EX, 1, zlib.crc32(folder.name.encode()))
         yield
     finally:
-        if handle is not None:
-            os.close(handle)
+        if handle is not None and is_locked:
+            fcntl.lockf(handle, fcntl.LOCK_UN, 1, place)
+
+
+@functools.cache
+def _lock_file(path: Path) -> int | None:
+    """Return a descriptor that stays open: to close one ends all locks of the process on the file."""
+    with contextlib.suppress(OSError):
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666) if fcntl else None
+    return None
+
+
+def _lock(handle: int, place: int) -> bool:
+    """Wait for the lock on a byte; return False where locking is not possible.
+
+    Two processes whose threads wait for each other's locks would be refused as deadlocked if they waited
+    within the system.
+    """
+    while True:
+        try:
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+        except (BlockingIOError, PermissionError):
+            time.sleep(LOCK_INTERVAL)
+        except OSError:
+            return False
+        else:
+            return True
 
 
 def _place() -> Path:
@@ -189,40 +273,6 @@ def use_temporary_folder(failure: BaseException | None) -> None:
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     _temporary.append(made)
     wp.config.kernel_cache_dir = made
-
-
-def _checksums(folder: Path) -> dict[str, str]:
-    return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.iterdir())
-        if path.suffix in LOADED
-    }
-
-
-def damaged(folder: Path) -> bool:
-    """Return whether files in a module's folder differ from those that were loaded before."""
-    try:
-        noted = json.loads((folder / CHECKSUMS).read_bytes())
-        found = _checksums(folder)
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    except (OSError, ValueError):
-        return True
-    return not isinstance(noted, dict) or any(noted.get(name, sum_) != sum_ for name, sum_ in found.items())
-
-
-def _record(folder: Path) -> None:
-    """Write the checksums of loaded files; existing ones are kept."""
-    with contextlib.suppress(OSError, ValueError):
-        path = folder / CHECKSUMS
-        found = _checksums(folder)
-        noted = json.loads(path.read_bytes()) if path.exists() else {}
-        if found.keys() <= noted.keys():
-            return
-        handle, name = tempfile.mkstemp(dir=folder, suffix=".tmp")
-        with os.fdopen(handle, "w") as file:
-            json.dump({**found, **noted}, file)
-        os.replace(name, path)
 
 
 def _discard(folder: Path) -> bool:

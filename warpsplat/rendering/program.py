@@ -19,7 +19,7 @@ from warpsplat.errors import cause_of
 from warpsplat.native import messages_hidden
 from warpsplat.rendering.device_lock import exclusive
 from warpsplat.rendering.helpers import shared
-from warpsplat.rendering.kernel_cache import load
+from warpsplat.rendering.kernel_cache import expect, load
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +40,9 @@ class Launch:
 class Program:
     """Launches in order. On a CPU with several threads, a split launch runs as pieces of its range.
 
+    They are recorded when the first of them is needed, so that the kernels of all programs that have been
+    prepared by then are compiled side by side.
+
     Warp runs a CPU launch on one thread but releases the interpreter lock, and every kernel here takes the
     index of its first thread and writes only its own elements, so pieces may run at the same time and the
     result does not depend on how many there are. Not copied: arrays are those given when recorded.
@@ -51,7 +54,9 @@ class Program:
         self.threads = threads if device.is_cpu else 1
         self.stage = stage
         """Name of the launches that are added from now on, for ``run_timed``."""
-        self.launches: list[Launch] = []
+        self._launches: list[Launch] = []
+        self._added: list[Callable[[], Launch]] = []
+        """What records the launches that were added since."""
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
         self._commands: list[tuple[wp.Launch, ctypes.Structure | None]] = []
@@ -66,7 +71,7 @@ class Program:
         split: bool = False,
         **values: Any,
     ) -> None:
-        """Append a launch. An empty range is left out.
+        """Append a launch, whose kernel may be compiled meanwhile. An empty range is left out.
 
         Args:
             kernel: its first parameter is the index of a piece's first thread.
@@ -81,12 +86,19 @@ class Program:
         shape = (dim,) if isinstance(dim, int) else tuple(dim)
         if min(shape) == 0:
             return
-        load(kernel, self.device)
         arguments = bind(kernel, sources, values)
         self._arrays.append(arguments)
+        expect(kernel, self.device)
+        count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
+        self._added.append(functools.partial(self._record, self.stage, kernel, shape, arguments, count))
+
+    def _record(
+        self, stage: str, kernel: wp.Kernel, shape: tuple[int, ...], arguments: list[Any], count: int
+    ) -> Launch:
+        """Return a launch in ``count`` pieces."""
+        load(kernel, self.device)
         whole = wp.launch(kernel, dim=shape, inputs=[0, *arguments], device=self.device, record_cmd=True)
         assert whole is not None
-        count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
         if count == 1:
             commands: list[tuple[wp.Launch, ctypes.Structure | None]] = [(whole, None)]
         else:
@@ -96,12 +108,25 @@ class Program:
             )
             commands = [(command, pack(command)) for command in parts]
         self._commands += commands
-        self.launches.append(Launch(self.stage, kernel.key, tuple(itertools.starmap(replay, commands))))
+        return Launch(stage, kernel.key, tuple(itertools.starmap(replay, commands)))
+
+    def record(self) -> None:
+        """Load the kernels of the launches that were added, and record these."""
+        while self._added:
+            self._launches.append(self._added[0]())
+            del self._added[0]
+
+    @property
+    def launches(self) -> list[Launch]:
+        """All launches, recorded."""
+        self.record()
+        return self._launches
 
     def rebind(self, name: str, pointer: int) -> None:
         """Give the array ``name``, which only this program has, other memory: in all its launches. The caller
         keeps that alive.
         """
+        self.record()
         if name not in self._places:
             self._places[name] = [
                 place
@@ -120,7 +145,8 @@ class Program:
 
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
-        self.launches.append(Launch(self.stage, function.__name__, (lambda: function(*arguments),)))
+        launch = Launch(self.stage, function.__name__, (lambda: function(*arguments),))
+        self._added.append(lambda: launch)
 
     def run(self) -> None:
         """Replay all launches."""
@@ -190,6 +216,8 @@ def capture(device: wp.Device, programs: Sequence[Program]) -> wp.Graph | None:
             return None
     elif not wp.is_mempool_enabled(device):
         return None
+    for program in programs:
+        program.record()
     with exclusive() as alone:
         if not alone and device.is_cpu:
             return None

@@ -14,6 +14,7 @@ from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.bins import Bins, StageInputs
 from warpsplat.rendering.film import Film
 from warpsplat.rendering.forms import record_gather, record_place
+from warpsplat.rendering.kernel_cache import expect
 from warpsplat.rendering.memory import check_memory
 from warpsplat.rendering.models import EXACT, Model
 from warpsplat.rendering.paint import Painting
@@ -152,6 +153,14 @@ class Renderer:
         self.paint.backward(program)  # -> colours, opacities
         self.coverage.backward(program)  # -> samples -> points, widths
         record_gather(program, self.parameters)  # -> values
+
+    def expect_backward(self) -> None:
+        """Announce the kernels of the adjoint now, as those of ``forward`` are (``kernel_cache.expect``)."""
+        _ = self.backward_program
+
+    def expect_removal_costs(self) -> None:
+        """Announce the kernel of ``removal_costs``."""
+        expect(composite.make_removal_cost(self.backend.column), self.backend.device)
 
     def bytes(self) -> int:
         """Return the memory of all arrays that the programs work on [bytes]."""

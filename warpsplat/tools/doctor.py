@@ -186,8 +186,6 @@ def check_cache() -> Check:
     """Check the folder of compiled kernels."""
     import warp as wp
 
-    from warpsplat.rendering.kernel_cache import damaged
-
     folder = Path(str(wp.config.kernel_cache_dir))
     modules = [path for path in folder.glob("wp_*") if path.is_dir()] if folder.is_dir() else []
     size = sum(map(_size, modules))
@@ -200,8 +198,6 @@ def check_cache() -> Check:
     except OSError as error:
         text, hint = f"{folder}: cannot be written: {error.strerror}", "WARP_CACHE_PATH names another folder"
         return Check(text, values, "broken", hint)
-    if bad := sum(damaged(path) for path in modules):
-        return Check(f"{text}, {bad} damaged", values, "note", "they are rebuilt when needed")
     return Check(text, values)
 
 
