@@ -81,7 +81,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
     "--against",
     metavar="OTHER",
     show_default=False,
-    help="Compare with another device, another Python's warpsplat, or the one in another folder, in turn.",
+    help="Compare in turn with another device (cuda:0), another Python's warpsplat, or the one in a folder.",
 )
 @click.option(
     "--rounds", type=click.IntRange(2, 1000), default=5, metavar="N", help="Rounds of each, with --against."
@@ -90,15 +90,11 @@ def table(values: dict[str, Any], verbose: int) -> str:
 @click.option("-v", "--verbose", count=True, show_default=False, help="Also list the kernels.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
-    r"""Time a training step and its stages on a random scene.
+    """Time a training step and its stages on a random scene.
 
     Shapes have uniform centres and radii of 5 to 10 % of the width (half of
     that on canvases wider than 2000 px): closed outlines of 4 cubics on a
     jittered circle, or strokes of 3 cubics that are 3 px wide. Nothing moves.
-
-    \b
-    warpsplat bench --against cuda:0
-    warpsplat bench --against /other/venv/bin/python
     """
     width, height = parse_size(size)
     if options["against"]:
