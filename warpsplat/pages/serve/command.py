@@ -12,7 +12,7 @@ from warpsplat.cli.echo import echo, set_verbosity
 from warpsplat.cli.options import device_option, threads_option
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
-from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.runs import Limits
 
 
 @click.command("serve", context_settings={"help_option_names": ["-h", "--help"]})
