@@ -38,9 +38,7 @@ def test_a_page_receives_the_progress(visitor: Visitor) -> None:
         (told,) = state["runs"]
         seen.append(told)
         live = told.get("live", {})
-        if (
-            live.get("pictures") and live["work"] and not live["draft"]
-        ):
+        if live.get("pictures") and live["work"] and not live["draft"]:
             svg = visitor.client.get(visitor.at("runs", told["id"], "live.svg"))
             assert svg.headers["content-type"] == "image/svg+xml" and svg.text.startswith("<svg")
             break

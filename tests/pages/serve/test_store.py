@@ -37,7 +37,7 @@ class Made:
 
 
 def upload(size: int = 100) -> Upload:
-    return Upload("photo.png", bytes(size), 8, 8, b"", "image/png", transparent=False)
+    return Upload("photo.png", bytes(size), 8, 8, b"", "image/png")
 
 
 def add(store: Store, image: str) -> str:

@@ -120,7 +120,8 @@
       }
     }
     const others = Object.entries(given).filter(([name]) => !(name in facts.controls));
-    byId("preset-hint").textContent = others.map(([name, value]) => (value === true ? name : `${name} ${value}`)).join(", ");
+    const words = others.map(([name, value]) => (value === true ? name : `${name} ${value}`)).join(", ");
+    byId("preset-hint").textContent = words && `Also: ${words}`;
     showNumbers();
   }
 
@@ -166,13 +167,13 @@
   });
 
   function name({ number, values }) {
-    const words = Object.entries(facts.controls)
-      .filter(([key]) => key in values)
-      .map(([key, { label, choices, default: without }]) => {
-        const word = choices[values[key]] ?? values[key];
-        return choices[without] && without ? word.toLowerCase() : `${label.toLowerCase()} ${String(word).toLowerCase()}`;
-      });
-    return `${number} · ${[values.preset, ...words].filter(Boolean).join(", ") || "automatic"}`;
+    const words = Object.entries(values).map(([key, value]) => {
+      if (!(key in facts.controls)) return value; // the preset
+      const { label, choices, default: without } = facts.controls[key];
+      const word = choices[value]?.toLowerCase() ?? value;
+      return choices[without] && without ? word : `${label.toLowerCase()} ${word}`;
+    });
+    return `${number} · ${words.join(", ") || "automatic"}`;
   }
 
   // Figures.
@@ -183,11 +184,12 @@
     if (run.state === "waiting") return run.place ? `Waiting: ${run.place} before it` : "Waiting";
     const { live } = run;
     if (run.stopping) return "Stopping, and measuring the file";
-    const words = [`${live.draft ? "Draft: " : ""}${Math.floor(100 * live.work)} %`];
+    const words = live.draft ? ["Draft"] : [];
+    if (live.work) words.push(`${Math.floor(100 * live.work)} %`);
     if (live.shapes) words.push(counted(live.shapes, "shape"));
     if (live.psnr != null) words.push(`${live.psnr.toFixed(1)} dB${live.fine ? "" : " (reduced)"}`);
     if (live.left != null && live.left >= 1) words.push(`${clock(live.left)} left`);
-    return live.note || words.join(" · ");
+    return live.note || words.join(" · ") || "Started";
   }
 
   function size(bytes) {
@@ -255,7 +257,6 @@
     const root = byId("viewer-template").content.firstElementChild.cloneNode(true);
     root.dataset.width = image.width;
     root.dataset.height = image.height;
-    root.classList.toggle("transparent", image.transparent);
     root.querySelector(".viewer-stage").style.aspectRatio = `${image.width} / ${image.height}`;
     byId("stage").replaceChildren(root);
     viewer = new warpsplat.Viewer(root);
@@ -294,16 +295,17 @@
 
   function show() {
     const images = new Map(model.images.map((image) => [image.id, image]));
-    if (arriving && images.has(arriving)) {
-      enter(images.get(arriving));
+    const arrived = images.get(arriving);
+    if (arrived) {
       arriving = null;
-      form.elements.preset.focus({ preventScroll: true });
+      enter(arrived);
     } else if (!images.has(current)) {
       current = viewer = null;
       if (model.images.length && !arriving) open(model.images.at(-1));
     }
     byId("drop").hidden = Boolean(current);
     byId("another").hidden = byId("work").hidden = !current;
+    if (arrived) form.elements.preset.focus({ preventScroll: true });
     showImages();
     const runs = model.runs.filter((run) => run.image === current);
     for (const run of runs) fetchPicture(run);
@@ -357,10 +359,12 @@
       return; // the event shows everything
     }
     const wanted = runs.map(card).reverse(); // the latest first
-    const there = byId("results").children;
-    if (there.length !== wanted.length || wanted.some((element, place) => there[place] !== element)) {
-      byId("results").replaceChildren(...wanted);
-    }
+    const results = byId("results");
+    for (const element of [...results.children]) if (!wanted.includes(element)) element.remove();
+    wanted.forEach((element, place) => {
+      const there = results.children[place]; // moved only if it has to be: it may have the focus
+      if (there !== element) results.insertBefore(element, there ?? null);
+    });
   }
 
   function newCard(run) {
