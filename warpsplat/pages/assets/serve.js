@@ -145,7 +145,14 @@
     complain("", "refused");
     if (!current) return;
     const request = JSON.stringify({ image: current, settings: chosen() });
-    follow = (await made("/runs", request, "application/json")).run; // in place of one that is not over
+    const before = follow;
+    follow = "coming"; // it replaces a run that is not over, whose picture stays until there is a new one
+    try {
+      follow = (await made("/runs", request, "application/json")).run;
+    } catch (error) {
+      follow = before;
+      throw error;
+    }
   }, "refused");
   form.addEventListener("submit", (event) => {
     event.preventDefault();

@@ -57,9 +57,10 @@ def command(
 ) -> None:
     """Serve a page to vectorize images in a browser, until Ctrl-C.
 
-    Drop an image on it, choose settings, watch the shapes grow, stop at any
-    time, compare results side by side and save them. Nothing leaves this
-    machine or is stored: images and results are kept in memory only.
+    Drop an image on it, see a draft at once and the result soon after, choose
+    a preset or settings, compare results side by side and save them as SVG,
+    PNG, PDF, DXF or EPS. Nothing leaves this machine or is stored: images and
+    results are kept in memory only.
     """
     interrupt = Interrupt()
     from warpsplat.fit.options import parse_bytes
