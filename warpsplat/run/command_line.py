@@ -30,9 +30,12 @@ def vectorize_command(
         further: further words.
         preset: one that the settings were made with: it may say what no flag does.
     """
-    choices = [(_words(*flags_of(settings, name), name), name) for name in dict.fromkeys((preset, None))]
-    exact = [words for words, name in choices if _settings(*flags_of(settings, name), name) == settings]
-    words = min(exact or [choices[-1][0]], key=len)
+    choices = []
+    for name in dict.fromkeys((preset, None)):
+        quality, given = flags_of(settings, name)
+        choices.append((_settings(quality, given, name) == settings, _words(quality, given, name)))
+    exact = [words for is_exact, words in choices if is_exact]
+    words = min(exact or [choices[-1][1]], key=len)
     line = shlex.join(["warpsplat", "vectorize", as_path(image), *words, *further, "-o", output])
     return line if exact else f"{line}  # and settings without a flag"
 
