@@ -212,7 +212,8 @@ UNNAMED_OR_UNSEEN = """() => {
     // What has the focus, if it has no name or nothing shows the focus.
     const it = document.activeElement;
     const name = it.ariaLabel || it.labels?.[0]?.textContent || it.textContent || it.title;
-    const ringed = [it, it.nextElementSibling, it.parentElement].filter(Boolean).flatMap((each) => [
+    const isSeen = (each) => each && getComputedStyle(each).opacity !== "0" && !each.matches(".unseen");
+    const ringed = [it, it.nextElementSibling, it.parentElement].filter(isSeen).flatMap((each) => [
         getComputedStyle(each).outlineStyle, getComputedStyle(each, "::after").outlineStyle,
     ]);
     return name?.trim() && ringed.some((style) => style !== "none") ? "" : it.outerHTML;
