@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from warpsplat.cli.main import cli
+from warpsplat.errors import UsageError
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.run.command_line import refine_command, several_command, vectorize_command
-from warpsplat.run.options import OPTIONS, settings_from
+from warpsplat.run.options import OPTIONS, preset_names, settings_from, with_preset
 from warpsplat.scene import Kind
 
 CASES: list[dict[str, Any]] = [
@@ -40,7 +41,9 @@ def settings_of(line: str) -> Settings:
     command = cli.get_command(click.Context(cli), "vectorize")
     assert command
     given = command.make_context("vectorize", words[2:]).params
-    return settings_from({key: value for key, value in given.items() if key in NAMES})
+    return settings_from(
+        with_preset(given["preset"], {key: value for key, value in given.items() if key in NAMES})
+    )
 
 
 @pytest.mark.parametrize("given", CASES, ids=lambda given: "-".join(given) or "nothing")
@@ -61,6 +64,25 @@ def test_what_no_flag_says_is_told() -> None:
     assert vectorize_command(make_settings(bending=0.1), "a.png", "a.svg").endswith(
         "# and settings without a flag"
     )
+
+
+@pytest.mark.parametrize("further", [{}, {"quality": "draft", "detail": 0.2}, {"curves": 9}, {"open": True}])
+@pytest.mark.parametrize("preset", preset_names())
+def test_a_preset_is_named(preset: str, further: dict[str, Any]) -> None:
+    try:
+        settings = make_settings(**with_preset(preset, dict(further)))
+    except UsageError:
+        return  # not every form is a stroke
+    line = vectorize_command(settings, "x.png", "out.svg", preset=preset)
+    assert settings_of(line) == settings
+    assert f"--preset {preset}" in line and len(shlex.split(line)) <= 7 + 2 * len(further)
+
+
+def test_what_a_preset_sets_and_no_flag_takes_back() -> None:
+    """The preset is not named then."""
+    settings = make_settings(shape="triangle", curves=250, opaque=False)
+    line = vectorize_command(settings, "x.png", "out.svg", preset="low-poly")
+    assert settings_of(line) == settings and "preset" not in line
 
 
 def test_refine() -> None:

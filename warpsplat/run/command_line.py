@@ -4,29 +4,40 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Quality, Settings, levels_of, make_settings
-from warpsplat.run.options import OPTIONS
-from warpsplat.scene import Kind
+from warpsplat.run.options import KINDS, OPTIONS, with_preset
 
 REFINE_ITERATIONS = 200
 """Default number of steps of ``warpsplat refine``."""
 
 
-def vectorize_command(settings: Settings, image: str, output: str, *further: str) -> str:
-    """Return the command that makes ``output`` of ``image`` with ``settings``; ``further``: further words.
+def vectorize_command(
+    settings: Settings, image: str, output: str, *further: str, preset: str | None = None
+) -> str:
+    """Return the shortest command that makes ``output`` of ``image`` with ``settings``.
 
-    A comment follows if flags cannot express them, as with settings that only batch files have.
+    A comment follows if no command can, as with settings that only batch files have.
+
+    Args:
+        settings: the settings.
+        image: file name of the image.
+        output: file name of the result.
+        further: further words.
+        preset: one that the settings were made with: it may say what no flag does.
     """
-    quality, given = flags_of(settings)
-    line = shlex.join(
-        ["warpsplat", "vectorize", as_path(image), *_words(quality, given), *further, "-o", output]
-    )
-    return line if _settings(quality, given) == settings else f"{line}  # and settings without a flag"
+    choices = []
+    for name in dict.fromkeys((preset, None)):
+        quality, given = flags_of(settings, name)
+        choices.append((_settings(quality, given, name) == settings, _words(quality, given, name)))
+    exact = [words for is_exact, words in choices if is_exact]
+    words = min(exact or [choices[-1][1]], key=len)
+    line = shlex.join(["warpsplat", "vectorize", as_path(image), *words, *further, "-o", output])
+    return line if exact else f"{line}  # and settings without a flag"
 
 
 def several_command(
@@ -57,50 +68,62 @@ def as_path(name: str) -> str:
     return f"./{name}" if name.startswith("-") and name != "-" else name
 
 
-def flags_of(settings: Settings) -> tuple[Quality, dict[str, Any]]:
-    """Return the quality and the fewest other arguments of ``make_settings`` that give ``settings``."""
-    choices = [(quality, _given(settings, quality)) for quality in QUALITIES]
-    exact = [one for one in choices if _settings(*one) == settings]
+def flags_of(settings: Settings, preset: str | None = None) -> tuple[Quality, dict[str, Any]]:
+    """Return the quality and the fewest other arguments of ``make_settings`` that give ``settings``.
+
+    ``preset``: one that is named as well.
+    """
+    choices = [(quality, _given(settings, quality, preset)) for quality in QUALITIES]
+    exact = [one for one in choices if _settings(*one, preset) == settings]
     return min(exact or choices, key=lambda one: (len(one[1]), one[0] != DEFAULT_QUALITY))
 
 
-def _given(settings: Settings, quality: Quality) -> dict[str, Any]:
+def _given(settings: Settings, quality: Quality, preset: str | None) -> dict[str, Any]:
     given: dict[str, Any] = {"renderer": settings.renderer} if settings.renderer != "exact" else {}
-    default = _settings(quality, given) or Settings()
+    default = _settings(quality, given, preset) or Settings()
     for name in (option.field for option in OPTIONS if option.keyword == option.field):
         if getattr(settings, name) != getattr(default, name):
             given[name] = getattr(settings, name)
-    if settings.kind == Kind.STROKE:
+    if settings.kind != default.kind:
         given["kind"] = settings.kind
     if settings.is_limited:  # implies it
         given.pop("opaque", None)
     if settings.levels and settings.levels != levels_of(settings.curves):
         given.pop("curves", None)
     elif not settings.simplify:
-        given["curves"] = settings.curves
+        if default.simplify:
+            given["curves"] = settings.curves
         if given.pop("levels", None):
             given["layered"] = True
-    return given
+    # No flag takes back what a preset sets.
+    return {
+        name: value for name, value in given.items() if value is not False and value not in (None, (), "")
+    }
 
 
-def _settings(quality: Quality, given: dict[str, Any]) -> Settings | None:
+def _settings(quality: Quality, given: dict[str, Any], preset: str | None = None) -> Settings | None:
     """Return the settings, or None if the arguments cannot be combined."""
+    named = {} if quality == DEFAULT_QUALITY else {"quality": quality}
+    kinds = {name: True for name, kind in KINDS.items() if kind == given.get("kind")}
+    others = {name: value for name, value in given.items() if name != "kind"}
     try:
-        return make_settings(quality, **given)
+        return make_settings(**with_preset(preset, {**named, **kinds, **others}))
     except UsageError:
         return None
 
 
-def _words(quality: Quality, given: dict[str, Any]) -> Iterator[str]:
+def _words(quality: Quality, given: dict[str, Any], preset: str | None = None) -> list[str]:
+    words = ["--preset", preset] if preset else []
     if quality != DEFAULT_QUALITY:
-        yield from ("--quality", quality)
+        words += ["--quality", quality]
     for option in OPTIONS:
         value = given.get(option.keyword if option.value is None else option.field)
         if option.type is bool and (value if option.value is None else value == option.value):
-            yield f"--{option.name}"
+            words.append(f"--{option.name}")
         elif option.type is not bool and value is not None:
             text = _text(option.name, value)
-            yield from (f"--{option.name}={text}",) if text.startswith("-") else (f"--{option.name}", text)
+            words += [f"--{option.name}={text}"] if text.startswith("-") else [f"--{option.name}", text]
+    return words
 
 
 def _text(name: str, value: Any) -> str:

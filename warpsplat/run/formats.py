@@ -37,13 +37,19 @@ NEEDS = {
 """Packages that formats need, by their endings."""
 
 
+def missing(path: Path) -> str:
+    """Return the package that a file of this name needs and that is not installed; empty: none."""
+    need = NEEDS.get(path.suffix.lower())
+    return need.package if need and importlib.util.find_spec(need.package) is None else ""
+
+
 def check_format(path: Path) -> None:
     """Raise ``UsageError`` if what makes a file of this name is not installed."""
-    need = NEEDS.get(path.suffix.lower())
-    if need and importlib.util.find_spec(need.package) is None:
+    if package := missing(path):
+        extra = NEEDS[path.suffix.lower()].extra
         raise UsageError(
-            f"{path}: {need.extra.upper()}s need a package that is not installed: "
-            f"pip install {need.package}, or warpsplat with its extra: '.[{need.extra}]'"
+            f"{path}: {extra.upper()}s need a package that is not installed: "
+            f"pip install {package}, or warpsplat with its extra: '.[{extra}]'"
         )
 
 

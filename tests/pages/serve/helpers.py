@@ -12,8 +12,8 @@ import httpx
 import numpy as np
 from PIL import Image
 
+from warpsplat.pages.serve.runs import Limits
 from warpsplat.pages.serve.server import WarpsplatServer
-from warpsplat.pages.serve.sessions import Limits
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
 
@@ -41,10 +41,9 @@ def until(condition: Any) -> Any:
 
 
 def held(store: Store) -> dict[str, int]:
-    """Return the numbers of sessions and runs, and the sizes of images and results [bytes]."""
+    """Return the numbers of runs, and the sizes of images and results [bytes]."""
     return {
-        "sessions": len(store._sessions),
-        "runs": len([*store._all_runs()]),
+        "runs": len(store._runs),
         "waiting": len(store._queue),
         "images": store._image_bytes(),
         "results": store._result_bytes(),
@@ -69,7 +68,6 @@ class Visitor:
     def __enter__(self) -> Visitor:
         answer = self.client.get(self.server.address(), follow_redirects=True)
         assert answer.text.startswith("<!doctype html>")
-        self.session = self.client.post("/sessions").json()["session"]
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -79,7 +77,7 @@ class Visitor:
         assert not self._thread.is_alive()
 
     def at(self, *parts: str) -> str:
-        return "/".join(["/sessions", self.session, *parts])
+        return "/".join(["", *parts])
 
     def upload(self, data: bytes, name: str = "photo.png") -> str:
         answer = self.client.post(self.at("images"), params={"name": name}, content=data)
@@ -95,7 +93,7 @@ class Visitor:
         return str(answer.json()["run"])
 
     def state(self) -> dict[str, Any]:
-        return self.store.state_of(self.session)
+        return self.store.state()
 
     def run(self, run: str) -> dict[str, Any]:
         return next(each for each in self.state()["runs"] if each["id"] == run)

@@ -6,16 +6,20 @@ import gc
 import io
 import weakref
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from PIL import Image
 
 import warpsplat
 from tests.pages.serve.helpers import Visitor, held, picture, until
 from warpsplat.fit.settings import make_settings
-from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.runs import Limits
 from warpsplat.rendering.parameters import Parameters
+from warpsplat.run.formats import missing, named_bytes
+from warpsplat.run.options import preset_names
 
 SHORT = {"curves": 4, "subject": "photo"}
 
@@ -35,9 +39,8 @@ def test_an_image_becomes_the_file_of_the_command_line(visitor: Visitor) -> None
     made = warpsplat.vectorize(
         data, settings=make_settings(curves=4, subject="photo"), device="cpu", threads=1
     )
-    answer = visitor.client.get(visitor.at("runs", run["id"], "result.svg?download"))
+    answer = visitor.client.get(visitor.at("runs", run["id"], "result.svg"))
     assert answer.text == made.svg
-    assert answer.headers["content-disposition"] == "attachment; filename*=UTF-8''my%20photo.svg"
     assert run["figures"]["bytes"] == len(made.svg) and run["figures"]["shapes"] == len(made.scene)
     assert run["figures"]["psnr"] == made.as_dict()["psnr"]
     assert run["command"] == "warpsplat vectorize 'my photo.png' --curves 4 --subject photo -o 'my photo.svg'"
@@ -48,8 +51,7 @@ def test_the_command_has_the_settings_of_the_form() -> None:
         run = visitor.begin(
             visitor.upload(picture(), "-a b.png"),
             colors=6,
-            open=False,
-            mixed=True,
+            kind="mixed",
             quality="high",
             **{"max-bytes": "9KB"},
         )
@@ -71,20 +73,81 @@ def test_a_run_that_is_stopped_has_a_file(visitor: Visitor) -> None:
     assert warpsplat.score(svg, picture()).psnr == pytest.approx(told["figures"]["psnr"], abs=0.01)
 
 
-def test_runs_are_queued() -> None:
-    with Visitor(Limits(waiting=2)) as visitor:
-        image = visitor.upload(picture())
-        first = visitor.begin(image, quality="high", **SHORT)
-        until(lambda: visitor.run(first)["state"] == "running")
-        second, third = (visitor.begin(image, **SHORT) for _ in range(2))
-        assert [visitor.run(run)["place"] for run in (second, third)] == [1, 2]
-        answer = visitor.start(image, **SHORT)
-        assert (answer.status_code, answer.headers["retry-after"]) == (429, "5")
-        assert one_line(answer.text) == "2 runs are waiting: try again when one is done"
-        visitor.client.post(visitor.at("runs", second, "stop"))  # leaves the queue
-        assert [run["id"] for run in visitor.state()["runs"]] == [first, third]
-        visitor.client.post(visitor.at("runs", first, "stop"))
-        assert visitor.over(third)["state"] == "done" and visitor.run(first)["state"] == "stopped"
+def test_runs_are_queued_and_a_new_one_replaces_what_is_not_over(visitor: Visitor) -> None:
+    image, other = visitor.upload(picture()), visitor.upload(picture(), "other.png")
+    first = visitor.begin(image, quality="high", **SHORT)
+    until(lambda: visitor.run(first)["state"] == "running")
+    second = visitor.begin(other, **SHORT)
+    assert visitor.run(second)["place"] == 1
+    third, fourth = (visitor.begin(image, **SHORT) for _ in range(2))
+    assert {run["id"] for run in visitor.state()["runs"]} >= {second, fourth}
+    assert not {run["id"] for run in visitor.state()["runs"]} & {first, third}
+    assert visitor.over(second)["state"] == visitor.over(fourth)["state"] == "done"
+    visitor.over(visitor.begin(image, **SHORT))
+    assert fourth in {run["id"] for run in visitor.state()["runs"]}  # a result stays
+
+
+def test_a_draft_is_shown_first(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    stops: list[bool] = []
+    vectorize = warpsplat.vectorize
+
+    def noted(*given: Any, **named: Any) -> Any:
+        asked.append(named["settings"])
+        result = vectorize(*given, **named)
+        for told in visitor.state()["runs"] if stops else ():
+            visitor.store.stop_run(told["id"])
+        return result
+
+    monkeypatch.setattr("warpsplat.pages.serve.worker.warpsplat.vectorize", noted)
+    image = visitor.upload(picture())
+    settings = {"curves": 4, "subject": "photo", "quality": "high"}
+    run = visitor.begin(image, **settings)
+    told = until(
+        lambda: (live := visitor.run(run).get("live")) and live["pictures"] and not live["draft"] and live
+    )
+    assert told["pictures"] >= 1
+    draft = visitor.client.get(visitor.at("runs", run, "live.svg")).text
+    assert asked == [make_settings(**{**settings, "quality": "draft"}), make_settings(**settings)]
+    visitor.client.delete(visitor.at("runs", run))
+    stops.append(True)  # what there is by then is kept
+    run = visitor.begin(image, **settings)
+    assert visitor.over(run)["state"] == "stopped" and len(asked) == 3
+    assert visitor.client.get(visitor.at("runs", run, "result.svg")).text == draft
+
+
+@pytest.mark.skipif(not preset_names(), reason="the extension batch has them")
+def test_presets(visitor: Visitor) -> None:
+    """The command names one, and the file is that of the command."""
+    run = visitor.begin(visitor.upload(picture()), preset="brush", curves=3)
+    command = visitor.over(run)["command"]
+    assert command == "warpsplat vectorize photo.png --preset brush --curves 3 -o photo.svg"
+    made = warpsplat.vectorize(picture(), preset="brush", curves=3, device="cpu", threads=1)
+    assert visitor.client.get(visitor.at("runs", run, "result.svg")).text == made.svg
+
+
+def test_what_is_saved(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = visitor.over(visitor.begin(visitor.upload(picture()), **SHORT))["id"]
+    svg = visitor.client.get(visitor.at("runs", run, "result.svg")).text
+
+    def saved(file: str) -> httpx.Response:
+        return visitor.client.get(visitor.at("runs", run, file))
+
+    assert saved("result.png").content == named_bytes(Path("x.png"), svg)
+    assert saved("result.eps").content.startswith(b"%!PS")
+    if not missing(Path("x.dxf")):
+        assert saved("result.dxf").content == named_bytes(Path("x.dxf"), svg)
+    report = saved("report.html")
+    assert report.text.startswith("<!doctype html>") and ">photo.png</span>" in report.text
+    assert report.headers["content-type"] == "application/octet-stream"  # it is never a page of this server
+    for unknown in ("result.html", "result.svgz", "result."):
+        assert saved(unknown).status_code == 404
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    answer = saved("result.dxf")
+    assert answer.status_code == 400
+    assert one_line(answer.text).startswith(
+        "photo.dxf: DXFs need a package that is not installed: pip install "
+    )
 
 
 def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,8 +165,8 @@ def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.Monkey
     try:
         image = visitor.upload(picture())
         run = visitor.over(visitor.begin(image, **SHORT))
-        held = [weakref.ref(visitor.store.upload(visitor.session, image))]
-        held.append(weakref.ref(visitor.store.run(visitor.session, run["id"])))
+        held: list[weakref.ref[object]] = [weakref.ref(visitor.store.upload(image))]
+        held.append(weakref.ref(visitor.store.run(run["id"])))
         assert arrays
         until(lambda: not [each for each in arrays if each()])
         assert visitor.client.delete(visitor.at("images", image)).status_code == 204
@@ -116,8 +179,10 @@ def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.Monkey
     ("settings", "said"),
     [
         ({"curves": "many"}, "curves must be a whole number from 1 to 100000, not 'many'"),
-        ({"subject": "drawing", "open": True}, "subject drawing and open cannot be combined"),
-        ({"closed": True, "open": True}, "closed and open cannot be combined"),
+        ({"subject": "drawing", "kind": "open"}, "subject drawing and open cannot be combined"),
+        ({"kind": "both"}, "kind must be one of closed, open, mixed, not 'both'"),
+        ({"preset": "/etc/presets.yaml"}, "there is no preset '/etc/presets.yaml'"),
+        ({"preset": ["brush"]}, "there is no preset ['brush']"),
         ({"max-bytes": "9Q"}, "not a size: '9Q'"),
         ({"shape": "cirkle"}, "shape must be one of "),
         ({"palette": "/etc/passwd"}, "unknown setting 'palette'; there are "),
@@ -160,10 +225,9 @@ def test_requests_of_unknown_or_excessive_size(visitor: Visitor) -> None:
     [
         "/%2e%2e/%2e%2e/etc/passwd",
         "/..%2f..%2fetc%2fpasswd",
-        "/sessions/..%2f..%2f..%2fetc%2fpasswd/events",
         "/assets/serve.js",
-        "/sessions/none/images/..%2f..%2fpasswd",
-        "/sessions/none/runs/none/result.svg",
+        "/images/..%2f..%2fpasswd",
+        "/runs/none/result.svg",
     ],
 )
 def test_paths_outside(visitor: Visitor, path: str) -> None:
@@ -184,7 +248,7 @@ def test_the_picture_of_an_image_is_encoded_here(visitor: Visitor) -> None:
     with Image.open(io.BytesIO(answer.content)) as shown:
         assert shown.size == (20, 30) and shown.getpixel((3, 3)) == (200, 10, 10, 128)
     (told,) = visitor.state()["images"]
-    assert (told["width"], told["height"], told["transparent"]) == (20, 30, True)
+    assert (told["width"], told["height"]) == (20, 30)
 
 
 def test_headers(visitor: Visitor) -> None:
@@ -210,14 +274,14 @@ def test_requests_that_are_not_authorised(visitor: Visitor) -> None:
         answer = client.get("/", headers={"host": host})
         assert one_line(answer.text) == "open the address that warpsplat serve printed: it contains a token"
     for headers in ({"origin": "http://evil.example"}, {"origin": "null"}, {"sec-fetch-site": "cross-site"}):
-        answer = client.post("/sessions", headers=headers)
+        answer = client.post("/runs", headers=headers)
         assert (
             answer.status_code == 403 and one_line(answer.text) == "requests from other pages are not allowed"
         )
     origin = visitor.server.address().partition("/?")[0]
-    assert client.post("/sessions", headers={"origin": origin}).status_code == 201
+    assert client.post("/runs", headers={"origin": origin}).status_code == 400
     client.cookies.clear()
-    elsewhere = visitor.server.address().replace("/?", "/sessions?")
+    elsewhere = visitor.server.address().replace("/?", "/events?")
     for path in ("/", "/?token=wrong", visitor.at("events"), elsewhere):
         assert client.get(path).status_code == 403
 

@@ -60,13 +60,33 @@ def test_no_pictures_without_a_reader() -> None:
     assert live.number == 0 and len(changes) == 10
 
 
+def test_a_draft_is_shown_until_the_run_is_as_good() -> None:
+    slow = Slow(cost=0.0)
+    live = LiveRun(clock=slow)
+    live.begin(is_draft=True)
+    assert live.as_dict()["draft"]
+    draft = warpsplat.vectorize(
+        np.zeros((16, 16, 3), np.uint8), 2, subject="photo", iterations=4, device="cpu"
+    )
+    ends = Progress(4, 4, 21.0, 1.0, 1.0, True, 2)
+    live.show_draft(replace(draft, history=(replace(ends, fine=False, psnr=25.0), ends)))
+    live.begin()
+    assert live.picture == draft.svg.encode() and live.number == 1 and not live.as_dict()["draft"]
+    reports(live, slow, count=9)  # 20 dB
+    assert live.number == 1 and live.as_dict()["work"] == 1
+    live._least[True] = 20.0
+    reports(live, slow, count=9)
+    assert live.number > 1 and live.picture != draft.svg.encode()
+
+
 def test_the_time_left() -> None:
     slow = Slow(cost=0.0)
     live = LiveRun(clock=slow)
     slow.now = 30.0  # kernels were compiled
     live.begin()
     live.notify("compiling kernels: 3 s")
-    assert live.as_dict() == {"work": 0.0, "note": "compiling kernels: 3 s", "seconds": 0.0}
+    told = {"work": 0.0, "note": "compiling kernels: 3 s", "seconds": 0.0, "draft": False, "pictures": 0}
+    assert live.as_dict() == told
     report = Progress(1, 10, math.inf, 1.0, 0.1, False, 5)
     live(report)
     told = live.as_dict()

@@ -11,7 +11,7 @@ from tests.files.test_formats import ENDLESS
 from tests.pages.serve.helpers import held
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import Settings
-from warpsplat.pages.serve.sessions import Limits, QueuedRun, Refused
+from warpsplat.pages.serve.runs import Limits, Order, QueuedRun, Refused
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.uploads import Upload, plain_name, read_upload
 
@@ -37,11 +37,11 @@ class Made:
 
 
 def upload(size: int = 100) -> Upload:
-    return Upload("photo.png", bytes(size), 8, 8, b"", "image/png", transparent=False)
+    return Upload("photo.png", bytes(size), 8, 8, b"", "image/png")
 
 
-def add(store: Store, session: str, image: str) -> str:
-    return store.add_run(session, image, {}, Settings(), "warpsplat")
+def add(store: Store, image: str) -> str:
+    return store.add_run(image, Order({}, Settings(), None, "warpsplat"))
 
 
 def begin(store: Store) -> QueuedRun:
@@ -57,47 +57,42 @@ def do(store: Store, svg: str = "<svg/>") -> QueuedRun:
     return run
 
 
-def test_a_closed_page_is_forgotten_after_a_while() -> None:
+def test_everything_is_forgotten_a_while_after_the_page_was_closed() -> None:
     clock = Clock()
     store = Store(Limits(grace=10), clock)
-    read, unread = store.open(), store.open()
-    image = store.add_upload(unread, upload())
-    add(store, unread, image)
+    image = store.add_upload(upload())
+    add(store, image)
     running = begin(store)
-    add(store, unread, image)
-    with store.attended(read):
-        clock.now = 9
-        assert not store.expire() and store.is_attended(read) and not store.is_attended(unread)
-        clock.now = 10
-        assert store.expire() and not store.expire()
-        assert running.stopping.is_set()
-        store.finish(running, Made())  # it ends later, and nobody wants it
-        nothing = dict.fromkeys(held(store), 0)
-        assert held(store) == {**nothing, "sessions": 1}
-        with pytest.raises(Refused, match="reload it") as refused:
-            store.state_of(unread)
-        assert refused.value.status == 404
-    clock.now = 19
-    assert not store.expire()
-    clock.now = 20
-    assert store.expire() and not held(store)["sessions"]
+    add(store, store.add_upload(upload()))
+    clock.now = 9
+    with store.attended():
+        clock.now = 30
+        assert store.is_attended() and not store.expire()
+    clock.now = 39
+    assert not store.is_attended() and not store.expire() and store.is_wanted(running)
+    clock.now = 40
+    assert store.expire() and not store.expire()
+    assert running.stopping.is_set() and not store.is_wanted(running)
+    store.finish(running, Made())  # it ends later, and nobody wants it
+    assert not any(held(store).values())
+    with pytest.raises(Refused, match="no such image"):
+        store.upload(image)
 
 
 def test_images_give_way_to_new_ones_but_not_while_they_are_needed() -> None:
     store = Store(Limits(upload=100, images=250))
-    session = store.open()
-    first, second = (store.add_upload(session, upload()) for _ in range(2))
-    add(store, session, first)
+    first, second = (store.add_upload(upload()) for _ in range(2))
+    add(store, first)
     with store.reserved(100):
-        assert [image["id"] for image in store.state_of(session)["images"]] == [first]
-        add(store, session, store.add_upload(session, upload(50)))
+        assert [image["id"] for image in store.state()["images"]] == [first]
+        add(store, store.add_upload(upload(50)))
         with pytest.raises(Refused, match="try again when a run is done") as refused, store.reserved(100):
             pass
         assert refused.value.status == 503
     with store.reserved(100):
         assert held(store)["images"] == 150 and held(store)["uploading"] == 100
     with pytest.raises(Refused):
-        store.upload(session, second)
+        store.upload(second)
 
 
 def test_two_of_the_largest_images_fit() -> None:
@@ -106,58 +101,61 @@ def test_two_of_the_largest_images_fit() -> None:
 
 def test_the_oldest_results_go_first() -> None:
     store = Store(Limits(results=25, runs=3))
-    session = store.open()
 
     def kept() -> list[str]:
-        return [run["id"] for run in store.state_of(session)["runs"]]
+        return [run["id"] for run in store.state()["runs"]]
 
-    image = store.add_upload(session, upload())
+    image = store.add_upload(upload())
+    runs = []
     for _ in range(3):
-        add(store, session, image)
-    runs = [do(store, "x" * 10) for _ in range(3)]
+        add(store, image)
+        runs.append(do(store, "x" * 10))
     assert kept() == [runs[1].id, runs[2].id]
     assert held(store)["results"] == 20
-    large = add(store, session, image)
+    large = add(store, image)
     do(store, "x" * 40)  # a result above the limit is held alone
     assert kept() == [large]
-    for _ in range(4):
-        add(store, session, image)
-    assert held(store)["runs"] == 4 and large not in kept()
+    unfinished = [add(store, store.add_upload(upload())) for _ in range(4)]
+    assert kept() == unfinished
 
 
-def test_sessions_are_limited() -> None:
-    store = Store(Limits(sessions=1))
-    store.open()
-    with pytest.raises(Refused, match="1 pages are open"):
-        store.open()
+def test_a_run_replaces_one_of_its_image_that_is_not_over() -> None:
+    store = Store(Limits())
+    image, other = (store.add_upload(upload()) for _ in range(2))
+    add(store, image)
+    kept = [do(store).id, add(store, other)]
+    add(store, image)
+    waiting = begin(store)
+    assert waiting.id == kept[1]
+    add(store, image)
+    running = begin(store)
+    kept.append(add(store, image))
+    assert running.stopping.is_set() and not store.is_wanted(running) and store.is_wanted(waiting)
+    assert [run["id"] for run in store.state()["runs"]] == kept
 
 
 def test_an_image_goes_with_its_runs() -> None:
     store = Store(Limits())
-    session = store.open()
-    one, other = (store.add_upload(session, upload()) for _ in range(2))
-    add(store, session, one)
+    one, other = (store.add_upload(upload()) for _ in range(2))
+    add(store, one)
     running = begin(store)
-    add(store, session, one)
-    kept = add(store, session, other)
-    store.remove_upload(session, one)
+    kept = add(store, other)
+    store.remove_upload(one)
     assert running.stopping.is_set()
-    (run,) = store.state_of(session)["runs"]
+    (run,) = store.state()["runs"]
     assert (run["id"], run["place"]) == (kept, 0)
-    store.remove_run(session, kept)
+    store.remove_run(kept)
     assert held(store)["waiting"] == held(store)["runs"] == 0
-    for missing in (lambda: store.run(session, kept), lambda: store.remove_upload(session, one)):
+    for missing in (lambda: store.run(kept), lambda: store.remove_upload(one)):
         with pytest.raises(Refused):
             missing()
 
 
 def test_the_end() -> None:
     store = Store(Limits())
-    session = store.open()
-    image = store.add_upload(session, upload())
-    add(store, session, image)
+    add(store, store.add_upload(upload()))
     running = begin(store)
-    add(store, session, image)
+    add(store, store.add_upload(upload()))
     version = store.version
     store.close()
     assert store.next() is None and running.stopping.is_set() and store.version > version

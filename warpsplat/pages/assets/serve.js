@@ -1,12 +1,12 @@
 "use strict";
-// The page of `warpsplat serve`. With every change the server sends the whole state of this page's session, and what is
-// shown follows from it: after a reload the page is complete with the first message.
+// The page of `warpsplat serve`. With every change the server sends its whole state, and what is shown follows from it:
+// after a reload the page is complete with the first message.
 (() => {
   const { byId, counted, node, data } = warpsplat;
   const facts = data();
   const STATES = { waiting: "Waiting", running: "Running", done: "Done", stopped: "Stopped", failed: "Failed" };
 
-  let session = new URLSearchParams(location.hash.slice(1)).get("s");
+  const form = byId("form");
   let model = { images: [], runs: [] };
   let current = null; // image that is shown
   let viewer = null;
@@ -23,42 +23,22 @@
       throw new Error("The server does not answer");
     });
     if (!answer.ok) throw new Error((await answer.text()).trim() || `Status ${answer.status}`);
-    return answer.headers.get("Content-Type")?.startsWith("application/json") ? answer.json() : null;
+    return answer;
   }
 
-  const at = (...parts) => `/sessions/${[session, ...parts].join("/")}`;
-
-  async function begin() {
-    session = (await ask("POST", "/sessions")).session;
-    history.replaceState(null, "", `#s=${session}`);
-    listen();
-  }
-
-  let begun = null; // several uploads at once open one session
-  const ready = () => (session ? Promise.resolve() : (begun ??= begin().finally(() => (begun = null))));
+  const at = (...parts) => `/${parts.join("/")}`;
+  const made = async (path, body, type) => (await ask("POST", path, body, type)).json();
 
   function listen() {
-    const stream = new EventSource(at("events"));
+    const stream = new EventSource("/events");
     stream.onmessage = (event) => {
+      const had = !byId("lost").hidden && model.images.length;
       byId("lost").hidden = true;
       model = JSON.parse(event.data);
+      if (had && !model.images.length) complain("This page was closed for a while: its images and results are gone.");
       show();
     };
-    stream.onerror = async () => {
-      byId("lost").hidden = false;
-      if (stream.readyState !== EventSource.CLOSED) return; // it tries again by itself
-      const had = model.images.length;
-      session = null; // forgotten, or of another server
-      model = { images: [], runs: [] };
-      try {
-        await ready();
-        if (had) complain("This page was closed for a while: its images and results are gone.");
-        show();
-      } catch (error) {
-        complain(error.message);
-      }
-      byId("lost").hidden = true;
-    };
+    stream.onerror = () => (byId("lost").hidden = false); // the browser tries again
   }
 
   function complain(text, where = "error") {
@@ -79,7 +59,6 @@
 
   const upload = attempt(async (files) => {
     complain("");
-    if (files.length) await ready();
     const refused = [];
     for (const file of files) {
       const name = file.name || "pasted.png";
@@ -87,8 +66,7 @@
         if (file.size > facts.upload) {
           throw new Error(`${name}: has ${(file.size / 1e6).toFixed(1)} MB; the limit is ${facts.upload / 1e6} MB`);
         }
-        const path = `${at("images")}?name=${encodeURIComponent(name)}`;
-        arriving = (await ask("POST", path, file, "application/octet-stream")).image;
+        arriving = (await made(`/images?name=${encodeURIComponent(name)}`, file, "application/octet-stream")).image;
         show();
       } catch (error) {
         refused.push(error.message);
@@ -123,45 +101,86 @@
     if (files.length) upload(files);
   });
 
-  // Settings -> a run.
+  // Settings -> a run. What is empty in the form is as the preset has it, else as the program decides.
+
+  const preset = () => facts.presets[form.elements.preset.value] ?? {};
+  const base = (name) => String(preset()[name] ?? facts.controls[name].default);
+  const isTyped = (name) => ["number", "text"].includes(facts.controls[name].type);
+
+  // Show a preset, and on top the values of a run.
+  function fill(values) {
+    form.elements.preset.value = values.preset ?? "";
+    const given = preset();
+    for (const [name, { hint }] of Object.entries(facts.controls)) {
+      form.elements[name].value = values[name] ?? (isTyped(name) ? "" : base(name));
+      if (isTyped(name)) form.elements[name].placeholder = given[name] ?? hint;
+      // Nothing takes back what a preset sets.
+      for (const empty of form.querySelectorAll(`[name="${name}"][value=""], [name="${name}"] > [value=""]`)) {
+        empty.disabled = name in given;
+      }
+    }
+    const others = Object.entries(given).filter(([name]) => !(name in facts.controls));
+    const words = others.map(([name, value]) => (value === true ? name : `${name} ${value}`)).join(", ");
+    byId("preset-hint").textContent = words && `Also: ${words}`;
+    showNumbers();
+  }
+
+  function showNumbers() {
+    for (const output of form.querySelectorAll("output")) output.value = form.elements[output.htmlFor.value].value;
+  }
 
   function chosen() {
-    const form = new FormData(byId("form"));
-    const settings = {};
-    for (const name in facts.defaults) if (form.get(name) !== facts.defaults[name]) settings[name] = form.get(name);
-    for (const name of ["max-bytes", "background"]) if (form.get(name)) settings[name] = form.get(name);
-    for (const name of ["curves", "colors", "detail"]) if (form.get(name)) settings[name] = Number(form.get(name));
-    if (form.get("kind") !== "closed") settings[form.get("kind")] = true;
+    const given = new FormData(form);
+    const settings = given.get("preset") ? { preset: given.get("preset") } : {};
+    for (const [name, { type }] of Object.entries(facts.controls)) {
+      const value = given.get(name);
+      if (value && value !== base(name)) settings[name] = ["number", "slider"].includes(type) ? Number(value) : value;
+    }
     return settings;
   }
 
+  let due = null;
   const start = attempt(async () => {
+    clearTimeout(due);
     complain("", "refused");
+    if (!current) return;
     const request = JSON.stringify({ image: current, settings: chosen() });
-    follow = (await ask("POST", at("runs"), request, "application/json")).run;
-    byId("stage").scrollIntoView({ block: "nearest", behavior: "smooth" }); // on a phone the form lies below it
+    const before = follow;
+    follow = "coming"; // it replaces a run that is not over, whose picture stays until there is a new one
+    try {
+      follow = (await made("/runs", request, "application/json")).run;
+    } catch (error) {
+      follow = before;
+      throw error;
+    }
   }, "refused");
-  byId("form").addEventListener("submit", (event) => {
+  form.addEventListener("submit", (event) => {
     event.preventDefault();
     start();
+    byId("stage").scrollIntoView({ block: "nearest", behavior: "smooth" }); // on a phone the form lies below it
   });
-  byId("form").addEventListener("input", () => complain("", "refused"));
+  form.addEventListener("input", () => {
+    complain("", "refused");
+    showNumbers();
+  });
+  form.addEventListener("change", ({ target }) => {
+    if (target.name === "preset") fill({ preset: target.value });
+    clearTimeout(due);
+    due = setTimeout(start, 250); // several changes at once, as with a key that is held
+  });
+  addEventListener("keydown", ({ key }) => {
+    const run = model.runs.find((each) => each.image === current && !isOver(each));
+    if (key === "Escape" && run) act(run.id, "stop");
+  });
 
   function name({ number, values }) {
-    const words = [
-      values.subject,
-      values.curves && counted(values.curves, "shape"),
-      values.open && "strokes",
-      values.mixed && "fills and strokes",
-      values.quality,
-      values.paint && `${values.paint} paint`,
-      values.colors && counted(values.colors, "colour"),
-      values.shape,
-      values.detail !== undefined && `detail ${values.detail}`,
-      values["max-bytes"] && `at most ${values["max-bytes"]}`,
-      values.background && `background ${values.background}`,
-    ];
-    return `${number} · ${words.filter(Boolean).join(", ") || "automatic"}`;
+    const words = Object.entries(values).map(([key, value]) => {
+      if (!(key in facts.controls)) return value; // the preset
+      const { label, choices, default: without } = facts.controls[key];
+      const word = choices[value]?.toLowerCase() ?? value;
+      return choices[without] && without ? word : `${label.toLowerCase()} ${word}`;
+    });
+    return `${number} · ${words.join(", ") || "automatic"}`;
   }
 
   // Figures.
@@ -172,11 +191,12 @@
     if (run.state === "waiting") return run.place ? `Waiting: ${run.place} before it` : "Waiting";
     const { live } = run;
     if (run.stopping) return "Stopping, and measuring the file";
-    const words = [`${Math.floor(100 * live.work)} %`];
+    const words = live.draft ? ["Draft"] : [];
+    if (live.work) words.push(`${Math.floor(100 * live.work)} %`);
     if (live.shapes) words.push(counted(live.shapes, "shape"));
     if (live.psnr != null) words.push(`${live.psnr.toFixed(1)} dB${live.fine ? "" : " (reduced)"}`);
     if (live.left != null && live.left >= 1) words.push(`${clock(live.left)} left`);
-    return live.note || words.join(" · ");
+    return live.note || words.join(" · ") || "Started";
   }
 
   function size(bytes) {
@@ -244,13 +264,20 @@
     const root = byId("viewer-template").content.firstElementChild.cloneNode(true);
     root.dataset.width = image.width;
     root.dataset.height = image.height;
-    root.classList.toggle("transparent", image.transparent);
     root.querySelector(".viewer-stage").style.aspectRatio = `${image.width} / ${image.height}`;
     byId("stage").replaceChildren(root);
     viewer = new warpsplat.Viewer(root);
     viewer.set("image", at("images", image.id));
     viewer.addEventListener("show", show);
-    follow = model.runs.findLast((run) => run.image === image.id)?.id ?? null;
+    const latest = model.runs.findLast((run) => run.image === image.id);
+    follow = latest?.id ?? null;
+    if (latest) fill(latest.values);
+  }
+
+  // Open an image, and vectorize it at once.
+  function enter(image) {
+    open(image);
+    if (!follow) start();
   }
 
   function offer(run) {
@@ -275,16 +302,17 @@
 
   function show() {
     const images = new Map(model.images.map((image) => [image.id, image]));
-    if (arriving && images.has(arriving)) {
-      open(images.get(arriving));
+    const arrived = images.get(arriving);
+    if (arrived) {
       arriving = null;
-      byId("form").querySelector(".go").focus({ preventScroll: true });
+      enter(arrived);
     } else if (!images.has(current)) {
       current = viewer = null;
       if (model.images.length && !arriving) open(model.images.at(-1));
     }
     byId("drop").hidden = Boolean(current);
     byId("another").hidden = byId("work").hidden = !current;
+    if (arrived) form.elements.preset.focus({ preventScroll: true });
     showImages();
     const runs = model.runs.filter((run) => run.image === current);
     for (const run of runs) fetchPicture(run);
@@ -302,7 +330,7 @@
     const thumb = node("img", { src: at("images", image.id), alt: image.name });
     const pick = node("button", { className: "pick", title: image.name }, thumb);
     pick.addEventListener("click", () => {
-      open(image);
+      enter(image);
       show();
     });
     const title = `Remove ${image.name} and its results`;
@@ -326,7 +354,9 @@
   }
 
   function showRuns(runs) {
+    if (runs.some((run) => run.id === follow && run.error)) follow = null;
     const names = new Set(["image", ...runs.map((run) => run.id)]);
+    if (follow) names.add(viewer.shown("left")).add(viewer.shown("right")); // until there is something better
     for (const image of viewer.root.querySelectorAll("img")) if (!names.has(image.dataset.name)) withdraw(image.dataset.name);
     for (const run of runs) if (sources.has(run.id)) offer(run);
     if (follow && viewer.images(follow).length) {
@@ -336,15 +366,20 @@
       return; // the event shows everything
     }
     const wanted = runs.map(card).reverse(); // the latest first
-    const there = byId("results").children;
-    if (there.length !== wanted.length || wanted.some((element, place) => there[place] !== element)) {
-      byId("results").replaceChildren(...wanted);
-    }
+    const results = byId("results");
+    for (const element of [...results.children]) if (!wanted.includes(element)) element.remove();
+    wanted.forEach((element, place) => {
+      const there = results.children[place]; // moved only if it has to be: it may have the focus
+      if (there !== element) results.insertBefore(element, there ?? null);
+    });
   }
 
   function newCard(run) {
     const element = byId("run-template").content.firstElementChild.cloneNode(true);
-    element.addEventListener("click", (event) => act(run.id, event.target.closest("[data-do]")?.dataset.do));
+    element.addEventListener("click", ({ target }) => act(run.id, target.closest("[data-do]")?.dataset.do));
+    for (const button of element.querySelectorAll("[data-save]")) {
+      button.addEventListener("click", () => save(run.id, button));
+    }
     element.querySelector("h3").textContent = name(run);
     element.ariaLabel = name(run);
     element.querySelector('[data-do="show"]').ariaLabel = `Show ${name(run)} under the slider`;
@@ -392,16 +427,30 @@
     if (reduced) notes.push(`${reduced}.`);
     part(".why").textContent = notes.join(" ");
     part(".why").hidden = !notes.length;
-    const image = model.images.find((each) => each.id === run.image);
-    part('[data-do="download"]').href = `${at("runs", run.id, "result.svg")}?download`;
-    part('[data-do="download"]').download = `${image.name.replace(/\.[^.]*$/, "")}.svg`;
     part('[data-do="copy"]').title = run.command;
   }
+
+  const save = attempt(async (id, button) => {
+    if (button.ariaBusy === "true") return;
+    button.ariaBusy = "true";
+    try {
+      const run = model.runs.find((each) => each.id === id);
+      const image = model.images.find((each) => each.id === run.image);
+      const file = button.dataset.save;
+      const href = URL.createObjectURL(await (await ask("GET", at("runs", id, file))).blob());
+      const download = image.name.replace(/(\.[^.]*)?$/, file.slice(file.indexOf(".")));
+      node("a", { href, download }).click();
+      setTimeout(() => URL.revokeObjectURL(href), 10_000);
+    } finally {
+      button.ariaBusy = "false";
+    }
+  });
 
   const act = attempt(async (id, action) => {
     const run = model.runs.find((each) => each.id === id);
     if (!run || !action) return;
     if (action === "stop") await ask("POST", at("runs", id, "stop"));
+    if (action === "remove" && follow === id) follow = null;
     if (action === "remove") await ask("DELETE", at("runs", id));
     if (action === "left" || action === "right") viewer.show(action, viewer.shown(action) === id ? "image" : id);
     if (action === "show") {
@@ -414,6 +463,5 @@
     }
   });
 
-  if (session) listen();
-  else ready().catch((error) => complain(error.message));
+  listen();
 })();

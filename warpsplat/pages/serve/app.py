@@ -11,7 +11,7 @@ import json
 import os
 import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable
-from urllib.parse import quote
+from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -22,13 +22,15 @@ from starlette.routing import Route
 
 from warpsplat.errors import ImageError, UsageError, WarpsplatError, explain
 from warpsplat.native import release_memory
-from warpsplat.pages.serve.form import serve_page, settings_of
+from warpsplat.pages.environment import page
+from warpsplat.pages.report import report
+from warpsplat.pages.serve.form import CONTROLS, form_data, order_of, presets
 from warpsplat.pages.serve.guard import line
-from warpsplat.pages.serve.sessions import Refused
+from warpsplat.pages.serve.runs import QueuedRun, Refused
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.uploads import DEFAULT_NAME, plain_name, read_upload
 from warpsplat.pages.serve.worker import Machine, start_worker
-from warpsplat.run.command_line import vectorize_command
+from warpsplat.run.formats import missing, named_bytes
 
 UPLOAD_TIME = 300.0
 """Longest upload [s]: others wait for the memory that is reserved for it."""
@@ -38,6 +40,9 @@ EVENT_INTERVAL = 0.15
 
 PULSE = 5.0
 """Longest time between two events [s]: only writing reveals that a page was closed."""
+
+FORMATS = ("svg", "png", "pdf", "dxf", "eps")
+"""Formats in which results are saved."""
 
 CACHED = {"Cache-Control": "private, max-age=3600, immutable"}
 """Headers of what never changes."""
@@ -49,25 +54,32 @@ class Service:
     def __init__(self, store: Store, machine: Machine) -> None:
         """Start nothing yet."""
         self._store, self._machine = store, machine
-        self._page = serve_page(store.limits)
+        self._page = page(
+            "serve.html.j2",
+            assets=("viewer.css", "serve.css", "viewer.js", "serve.js"),
+            connects=True,
+            controls=CONTROLS,
+            presets=presets(),
+            formats={name: missing(Path(f"x.{name}")) for name in FORMATS},
+            data={"upload": store.limits.upload, **form_data()},
+        )
         self._decoding = asyncio.Semaphore(1)
 
     def app(self) -> Starlette:
         """Return the application, which does the runs while it is served."""
-        session = "/sessions/{session}"
-        image, run = session + "/images/{image}", session + "/runs/{run}"
+        image, run = "/images/{image}", "/runs/{run}"
         routes = (
             ("GET", "/", self.show_page),
-            ("POST", "/sessions", self.open_session),
-            ("GET", f"{session}/events", self.stream_events),
-            ("POST", f"{session}/images", self.upload),
+            ("GET", "/events", self.stream_events),
+            ("POST", "/images", self.upload),
             ("GET", image, self.show_image),
             ("DELETE", image, self._action(self._store.remove_upload)),
-            ("POST", f"{session}/runs", self.start),
+            ("POST", "/runs", self.start),
             ("POST", f"{run}/stop", self._action(self._store.stop_run)),
             ("DELETE", run, self._action(self._store.remove_run)),
             ("GET", f"{run}/live.svg", self.show_live),
-            ("GET", f"{run}/result.svg", self.show_result),
+            ("GET", f"{run}/report.html", self.show_report),
+            ("GET", f"{run}/result.{{ending}}", self.show_result),
         )
         return Starlette(
             routes=[Route(path, answer, methods=[method]) for method, path, answer in routes],
@@ -96,24 +108,18 @@ class Service:
         """Send the page, whose head has a policy of its own."""
         return HTMLResponse(self._page, headers={"Content-Security-Policy": "frame-ancestors 'none'"})
 
-    async def open_session(self, _: Request) -> Response:
-        """Open a session for a page."""
-        return JSONResponse({"session": self._store.open()}, 201)
+    async def stream_events(self, _: Request) -> Response:
+        """Send the state whenever it changes."""
+        return StreamingResponse(self._events(), media_type="text/event-stream")
 
-    async def stream_events(self, request: Request) -> Response:
-        """Send the states of a session until it is forgotten."""
-        session = request.path_params["session"]
-        self._store.state_of(session)  # raises before the stream begins
-        return StreamingResponse(self._events(session), media_type="text/event-stream")
-
-    async def _events(self, session: str) -> AsyncIterator[str]:
+    async def _events(self) -> AsyncIterator[str]:
         """Yield server-sent events, each the whole state, so that a page may miss some."""
         version, last, silent = -1, "", 0.0
-        with contextlib.suppress(Refused), self._store.attended(session):  # a forgotten page opens a new one
+        with self._store.attended():
             while not self._store.closed:
                 if self._store.version != version:
                     version = self._store.version
-                    text = json.dumps(self._store.state_of(session), allow_nan=False)
+                    text = json.dumps(self._store.state(), allow_nan=False)
                     if text != last:
                         last, silent = text, 0.0
                         yield f"data: {text}\n\n"
@@ -125,8 +131,6 @@ class Service:
 
     async def upload(self, request: Request) -> Response:
         """Take an image: the body of the request is its file."""
-        session = request.path_params["session"]
-        self._store.state_of(session)
         name = plain_name(request.query_params.get("name", DEFAULT_NAME))
         limit = self._store.limits.upload
         length = request.headers.get("content-length", "")
@@ -142,18 +146,18 @@ class Service:
                 raise Refused(408, f"{name}: the upload took more than {UPLOAD_TIME:g} s") from None
             async with self._decoding:  # one at a time: pixels take many times the memory of their file
                 upload = await run_in_threadpool(read_upload, data, name)
-        return JSONResponse({"image": self._store.add_upload(session, upload)}, 201)
+        return JSONResponse({"image": self._store.add_upload(upload)}, 201)
 
     async def show_image(self, request: Request) -> Response:
         """Send the picture of an image."""
-        upload = self._store.upload(*_names(request))
+        upload = self._store.upload(request.path_params["image"])
         return Response(upload.picture, media_type=upload.media_type, headers=CACHED)
 
-    def _action(self, act: Callable[[str, str], None]) -> Callable[[Request], Awaitable[Response]]:
-        """Return an answer that calls a method of the store with the names in the address."""
+    def _action(self, act: Callable[[str], None]) -> Callable[[Request], Awaitable[Response]]:
+        """Return an answer that calls a method of the store with the name in the address."""
 
         async def answer(request: Request) -> Response:
-            act(*_names(request))
+            act(*request.path_params.values())
             await run_in_threadpool(release_memory)
             return Response(status_code=204)
 
@@ -161,7 +165,6 @@ class Service:
 
     async def start(self, request: Request) -> Response:
         """Queue a run of ``image`` with ``settings``."""
-        session = request.path_params["session"]
         try:
             given = json.loads(await _body(request, 20_000, "the request"))
         except ValueError:  # includes a wrong encoding
@@ -169,30 +172,45 @@ class Service:
         if not isinstance(given, dict):
             raise Refused(400, "the request must be a JSON object")
         image = str(given.get("image"))
-        upload = self._store.upload(session, image)
-        values, settings = settings_of(given.get("settings", {}), self._machine.max_memory)
-        path = f"./{upload.name}" if upload.name.startswith("-") else upload.name
-        command = vectorize_command(settings, path, f"{os.path.splitext(path)[0]}.svg")
-        return JSONResponse({"run": self._store.add_run(session, image, values, settings, command)}, 201)
+        name = self._store.upload(image).name
+        order = order_of(given.get("settings", {}), self._machine.max_memory, name)
+        return JSONResponse({"run": self._store.add_run(image, order)}, 201)
+
+    def _run(self, request: Request) -> QueuedRun:
+        return self._store.run(request.path_params["run"])
 
     async def show_live(self, request: Request) -> Response:
         """Send the current shapes of a run."""
-        run = self._store.run(*_names(request))
+        run = self._run(request)
         return _svg(run.svg or run.live.picture, {})
 
     async def show_result(self, request: Request) -> Response:
-        """Send the file of a run; ``download`` in the query makes the browser save it."""
-        run = self._store.run(*_names(request))
-        if "download" not in request.query_params:
+        """Send the file of a run, in one of ``FORMATS``."""
+        run, ending = self._run(request), request.path_params["ending"]
+        if ending == "svg":
             return _svg(run.svg, CACHED)
-        name = quote(os.path.splitext(run.upload.name)[0], safe="")
-        return _svg(run.svg, {"Content-Disposition": f"attachment; filename*=UTF-8''{name}.svg"})
+        if ending not in FORMATS or not run.svg:
+            raise HTTPException(404)
+        path = Path(run.upload.name).with_suffix(f".{ending}")
+        dxf = run.order.settings.dxf
+        data = await run_in_threadpool(named_bytes, path, run.svg.decode(), dxf=dxf)
+        return Response(data, media_type="application/octet-stream")
 
-
-def _names(request: Request) -> tuple[str, str]:
-    """Return the session of a request, and its image or run."""
-    session, name = request.path_params.values()
-    return session, name
+    async def show_report(self, request: Request) -> Response:
+        """Send the report on a run, which is computed now."""
+        run, machine = self._run(request), self._machine
+        if run.result is None:
+            raise HTTPException(404)
+        text = await run_in_threadpool(
+            report,
+            run.result,
+            run.upload.data,
+            command=run.order.command,
+            name=run.upload.name,
+            device=machine.device,
+            threads=machine.threads,
+        )
+        return Response(text, media_type="application/octet-stream")  # to be saved
 
 
 def _svg(data: bytes, headers: dict[str, str]) -> Response:

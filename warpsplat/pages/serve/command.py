@@ -12,7 +12,7 @@ from warpsplat.cli.echo import echo, set_verbosity
 from warpsplat.cli.options import device_option, threads_option
 from warpsplat.cli.signals import Interrupt
 from warpsplat.errors import UsageError
-from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.runs import Limits
 
 
 @click.command("serve", context_settings={"help_option_names": ["-h", "--help"]})
@@ -57,9 +57,10 @@ def command(
 ) -> None:
     """Serve a page to vectorize images in a browser, until Ctrl-C.
 
-    Drop an image on it, choose settings, watch the shapes grow, stop at any
-    time, compare results side by side and save them. Nothing leaves this
-    machine or is stored: images and results are kept in memory only.
+    Drop an image on it, see a draft at once and the result soon after, choose
+    a preset or settings, compare results side by side and save them as SVG,
+    PNG, PDF, DXF or EPS. Nothing leaves this machine or is stored: images and
+    results are kept in memory only.
     """
     interrupt = Interrupt()
     from warpsplat.fit.options import parse_bytes

@@ -18,7 +18,7 @@ from warpsplat.errors import UsageError, printable
 from warpsplat.pages.serve.app import Service
 from warpsplat.pages.serve.connections import Protocol, accept
 from warpsplat.pages.serve.guard import TOKEN, Guard
-from warpsplat.pages.serve.sessions import Limits
+from warpsplat.pages.serve.runs import Limits
 from warpsplat.pages.serve.store import Store
 from warpsplat.pages.serve.worker import Machine
 

@@ -1,4 +1,4 @@
-"""All that the server holds: in memory, bounded, and forgotten with the page."""
+"""What the server holds: in memory, bounded, and forgotten once the page is closed."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
-from warpsplat.fit.settings import Settings
 from warpsplat.pages.serve.live import LiveRun
-from warpsplat.pages.serve.sessions import Limits, QueuedRun, Refused, Session
+from warpsplat.pages.serve.runs import Limits, Order, QueuedRun, Refused
 from warpsplat.pages.serve.uploads import Upload
 from warpsplat.run.result import Result
 
@@ -26,77 +25,64 @@ def _find(items: dict[str, Item], name: str, kind: str) -> Item:
 
 
 class Store:
-    """All sessions, and the queue of runs. Any thread may use it.
+    """The images, their runs, oldest first, and the queue of runs. Any thread may use it.
 
-    Methods that take the name of a session, an image or a run raise ``Refused`` if it does not exist.
+    Methods that take the name of an image or a run raise ``Refused`` if it does not exist.
     """
 
     def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
         self.limits = limits
         self.version = 0
-        """Grows with every change that a page shows."""
+        """Grows with every change that the page shows."""
         self.closed = False
         self._clock = clock
-        self._sessions: dict[str, Session] = {}
+        self._uploads: dict[str, Upload] = {}
+        self._runs: dict[str, QueuedRun] = {}
         self._queue: deque[QueuedRun] = deque()
+        self._runs_started = 0
+        self._readers = 0
+        """Open streams of events: pages."""
+        self._seen = clock()
+        """Time at which the last page was closed [s]."""
         self._uploading = 0
         """Size of unfinished uploads [bytes]."""
         self._lock = threading.Condition(threading.RLock())
 
-    # Sessions
-
-    def open(self) -> str:
-        """Return the name of a new session.
-
-        Raises:
-            Refused: there are too many.
-        """
-        with self._lock:
-            if len(self._sessions) >= self.limits.sessions:
-                raise Refused(503, f"{self.limits.sessions} pages are open; close some and try again later")
-            name = secrets.token_urlsafe(16)
-            self._sessions[name] = Session(name, self._clock())
-            return name
-
-    def _session(self, name: str) -> Session:
-        if name not in self._sessions:
-            raise Refused(404, "this page was closed for a while and its images are gone: reload it")
-        return self._sessions[name]
+    # Pages
 
     @contextlib.contextmanager
-    def attended(self, name: str) -> Iterator[None]:
-        """Count a reader of a session's events in the block."""
+    def attended(self) -> Iterator[None]:
+        """Count a page in the block."""
         with self._lock:
-            session = self._session(name)
-            session.readers += 1
+            self._readers += 1
         try:
             yield
         finally:
             with self._lock:
-                session.readers -= 1
-                session.seen = self._clock()
+                self._readers -= 1
+                self._seen = self._clock()
 
-    def is_attended(self, name: str) -> bool:
-        """Return whether anybody reads a session's events."""
-        with self._lock:
-            return name in self._sessions and self._sessions[name].readers > 0
+    def is_attended(self) -> bool:
+        """Return whether a page is open."""
+        return self._readers > 0
 
     def expire(self) -> bool:
-        """Forget sessions that nobody has read for a while; return whether there were any."""
+        """Forget everything if no page has been open for a while; return whether there was anything."""
         with self._lock:
-            before = self._clock() - self.limits.grace
-            expired = [s for s in self._sessions.values() if s.readers <= 0 and s.seen <= before]
-            for session in expired:
-                self._forget(session, session.runs.values())
-                del self._sessions[session.id]
-            return bool(expired)
+            if self._readers or not self._uploads or self._clock() - self._seen < self.limits.grace:
+                return False
+            self._clear()
+            return True
 
-    def state_of(self, name: str) -> dict[str, Any]:
-        """Return the state of a session for JSON."""
+    def state(self) -> dict[str, Any]:
+        """Return everything that a page shows, for JSON."""
         with self._lock:
-            session = self._session(name)
-            busy = any(run.state == "running" for run in self._all_runs())
-            return session.as_dict({run: place + busy for place, run in enumerate(self._queue)})
+            busy = any(run.state == "running" for run in self._runs.values())
+            places = {run: place + busy for place, run in enumerate(self._queue)}
+            return {
+                "images": [{"id": name} | upload.as_dict() for name, upload in self._uploads.items()],
+                "runs": [run.as_dict(places.get(run, 0)) for run in self._runs.values()],
+            }
 
     # Images
 
@@ -116,72 +102,65 @@ class Store:
             with self._lock:
                 self._uploading -= size
 
-    def add_upload(self, name: str, upload: Upload) -> str:
-        """Hold an image, and return its name in the session.
+    def add_upload(self, upload: Upload) -> str:
+        """Hold an image, and return its name.
 
         Raises:
             Refused: there is no memory for it.
         """
         with self._lock:
-            session = self._session(name)
             self._make_room(upload.size)
             image = secrets.token_urlsafe(8)
-            session.uploads[image] = upload
+            self._uploads[image] = upload
             self._changed()
             return image
 
-    def upload(self, name: str, image: str) -> Upload:
+    def upload(self, image: str) -> Upload:
         """Return an image."""
         with self._lock:
-            return _find(self._session(name).uploads, image, "image")
+            return _find(self._uploads, image, "image")
 
-    def remove_upload(self, name: str, image: str) -> None:
+    def remove_upload(self, image: str) -> None:
         """Forget an image and its runs."""
         with self._lock:
-            self.upload(name, image)
-            self._drop_upload(self._session(name), image)
+            self.upload(image)
+            self._drop_upload(image)
 
     # Runs
 
-    def add_run(self, name: str, image: str, values: dict[str, Any], settings: Settings, command: str) -> str:
-        """Queue a run, and return its name.
-
-        Raises:
-            Refused: the queue is full.
-        """
+    def add_run(self, image: str, order: Order) -> str:
+        """Queue a run in place of one of this image that is not over, and return its name."""
         with self._lock:
-            session, upload = self._session(name), self.upload(name, image)
-            if len(self._queue) >= self.limits.waiting:
-                raise Refused(429, f"{len(self._queue)} runs are waiting: try again when one is done")
-            while sum(1 for _ in self._all_runs()) >= self.limits.runs and self._drop_oldest_run():
+            upload = self.upload(image)
+            self._forget(run for run in self._runs_of(image) if not run.is_over)
+            while len(self._runs) >= self.limits.runs and self._drop_oldest_run():
                 pass
-            live = LiveRun(lambda: self.is_attended(name), self._changed)
-            session.runs_started += 1
-            number = session.runs_started
-            run = QueuedRun(number, image, upload, values, settings, command, live=live)
-            session.runs[run.id] = run
+            self._runs_started += 1
+            live = LiveRun(self.is_attended, self._changed)
+            run = QueuedRun(self._runs_started, image, upload, order, live=live)
+            self._runs[run.id] = run
             self._queue.append(run)
             self._changed()
             return run.id
 
-    def run(self, name: str, run: str) -> QueuedRun:
+    def run(self, run: str) -> QueuedRun:
         """Return a run."""
         with self._lock:
-            return _find(self._session(name).runs, run, "run")
+            return _find(self._runs, run, "run")
 
-    def stop_run(self, name: str, run: str) -> None:
+    def stop_run(self, run: str) -> None:
         """End a run with its current shapes; one that waits leaves the queue."""
         with self._lock:
-            found = self.run(name, run)
+            found = self.run(run)
             if found.state == "waiting":
-                self._forget(self._session(name), [found])
+                self._forget([found])
             found.stopping.set()
             self._changed()
 
-    def remove_run(self, name: str, run: str) -> None:
+    def remove_run(self, run: str) -> None:
         """End and forget a run."""
         with self._lock:
-            self._forget(self._session(name), [self.run(name, run)])
+            self._forget([self.run(run)])
 
     # The worker
 
@@ -193,9 +172,12 @@ class Store:
                 return None
             run = self._queue.popleft()
             run.state = "running"
-            run.live.begin()
             self._changed()
             return run
+
+    def is_wanted(self, run: QueuedRun) -> bool:
+        """Return whether a run has not been forgotten."""
+        return run.id in self._runs
 
     def finish(self, run: QueuedRun, outcome: Result | str) -> None:
         """Take the result or the error of a run; the oldest results go if there are too many."""
@@ -209,10 +191,7 @@ class Store:
         """Forget everything, ask the current run to stop, and end the streams of events."""
         with self._lock:
             self.closed = True
-            for session in self._sessions.values():
-                self._forget(session, session.runs.values())
-            self._sessions.clear()
-            self._changed()
+            self._clear()
 
     # Capacity
 
@@ -221,51 +200,48 @@ class Store:
             self.version += 1
             self._lock.notify_all()
 
-    def _all_runs(self) -> Iterator[QueuedRun]:
-        for session in self._sessions.values():
-            yield from session.runs.values()
+    def _clear(self) -> None:
+        self._forget(self._runs.values())
+        self._uploads.clear()
+        self._changed()
+
+    def _runs_of(self, image: str) -> list[QueuedRun]:
+        return [run for run in self._runs.values() if run.image == image]
 
     def _image_bytes(self) -> int:
-        return sum(u.size for session in self._sessions.values() for u in session.uploads.values())
+        return sum(upload.size for upload in self._uploads.values())
 
     def _result_bytes(self) -> int:
-        return sum(len(run.svg) for run in self._all_runs())
+        return sum(len(run.svg) for run in self._runs.values())
 
     def _make_room(self, size: int) -> None:
         """Drop the oldest images without unfinished runs until ``size`` bytes are free."""
         capacity = self.limits.image_capacity - self._uploading - size
-        idle = [
-            (session, image)
-            for session in self._sessions.values()
-            for image in session.uploads
-            if all(run.is_over for run in session.runs_of(image))
-        ]
-        for session, image in idle:
+        for image in [each for each in self._uploads if all(run.is_over for run in self._runs_of(each))]:
             if self._image_bytes() <= capacity:
                 return
-            self._drop_upload(session, image)
+            self._drop_upload(image)
         if self._image_bytes() > capacity:
             held = f"{self.limits.image_capacity / 1e6:.0f} MB of images are in use"
             raise Refused(503, f"{held}: try again when a run is done")
 
-    def _drop_upload(self, session: Session, image: str) -> None:
-        self._forget(session, session.runs_of(image))
-        del session.uploads[image]
+    def _drop_upload(self, image: str) -> None:
+        self._forget(self._runs_of(image))
+        del self._uploads[image]
         self._changed()
 
     def _drop_oldest_run(self, but: QueuedRun | None = None) -> bool:
         """Forget the oldest run that is over; return whether there was one."""
-        for session in self._sessions.values():
-            for run in session.runs.values():
-                if run.is_over and run is not but:
-                    self._forget(session, [run])
-                    return True
+        for run in self._runs.values():
+            if run.is_over and run is not but:
+                self._forget([run])
+                return True
         return False
 
-    def _forget(self, session: Session, runs: Iterable[QueuedRun]) -> None:
+    def _forget(self, runs: Iterable[QueuedRun]) -> None:
         for run in list(runs):
             run.stopping.set()
             if run in self._queue:
                 self._queue.remove(run)
-            session.runs.pop(run.id, None)
+            self._runs.pop(run.id, None)
         self._changed()

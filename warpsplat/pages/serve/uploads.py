@@ -36,7 +36,6 @@ class Upload:
     """Upright and in sRGB."""
     media_type: str
     """Media type of the picture."""
-    transparent: bool
 
     @property
     def size(self) -> int:
@@ -45,8 +44,7 @@ class Upload:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the facts for JSON."""
-        names = ("name", "width", "height", "transparent")
-        return {name: getattr(self, name) for name in names} | {"bytes": len(self.data)}
+        return {"name": self.name, "width": self.width, "height": self.height, "bytes": len(self.data)}
 
 
 def plain_name(name: str) -> str:
@@ -75,7 +73,7 @@ def read_upload(data: bytes, name: str) -> Upload:
     else:
         media_type = "image/webp"
         image.save(buffer, "WEBP", quality=92, method=2)
-    width, height, transparent = shown.width, shown.height, shown.pixels.shape[2] == 4
+    width, height = shown.width, shown.height
     del shown, image
     release_memory()
-    return Upload(name, data, width, height, buffer.getvalue(), media_type, transparent)
+    return Upload(name, data, width, height, buffer.getvalue(), media_type)

@@ -1,10 +1,9 @@
-"""A session, an open page with its images and runs, and the limits of all sessions."""
+"""A run that the page asked for, and the limits of what a server holds."""
 
 from __future__ import annotations
 
 import secrets
 import threading
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -25,18 +24,14 @@ class Limits:
 
     upload: int = 50_000_000
     """Size of an image's file [bytes]."""
-    waiting: int = 20
-    """Runs in the queue."""
     runs: int = 100
     """Runs that are held, finished ones included."""
     images: int = 256 << 20
     """All images that are held or being uploaded [bytes]; two of the largest fit in any case."""
     results: int = 128 << 20
     """All SVGs that are held [bytes]."""
-    sessions: int = 100
-    """Pages whose images and results are held."""
     grace: float = 120.0
-    """Time until a closed page is forgotten, with its runs [s]: it may just be being reloaded."""
+    """Time until everything is forgotten once the page is closed [s]: it may just be being reloaded."""
 
     @property
     def image_capacity(self) -> int:
@@ -52,25 +47,35 @@ class Refused(Exception):  # noqa: N818 - an answer, not a fault
         self.status = status
 
 
-@dataclass(eq=False)
-class QueuedRun:
-    """A run that a page asked for. ``Store`` changes it under its lock."""
+@dataclass(frozen=True)
+class Order:
+    """What to do with an image."""
 
-    number: int
-    """Number among the runs of its session, from 1."""
-    image: str
-    """Name of the upload in its session."""
-    upload: Upload
     values: dict[str, Any]
-    """Settings, as they were given."""
+    """Values of the form's controls, as they were given."""
     settings: Settings
+    draft: Settings | None
+    """Settings of the draft that is shown first; None: the settings are a draft's."""
     command: str
     """Shell command that makes the same file."""
+
+
+@dataclass(eq=False)
+class QueuedRun:
+    """A run that the page asked for. ``Store`` changes it under its lock."""
+
+    number: int
+    """Number among all runs, from 1."""
+    image: str
+    """Name of the upload."""
+    upload: Upload
+    order: Order
     id: str = field(default_factory=lambda: secrets.token_urlsafe(8))
     state: State = "waiting"
     live: LiveRun = field(default_factory=LiveRun)
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set to end the run with its current shapes."""
+    result: Result | None = None
     svg: bytes = b""
     figures: dict[str, Any] = field(default_factory=dict)
     error: str = ""
@@ -86,42 +91,18 @@ class QueuedRun:
             self.error, self.state = outcome, "failed"
         else:
             figures = outcome.as_dict()
-            self.svg = outcome.svg.encode()
+            self.result, self.svg = outcome, outcome.svg.encode()
             self.figures = {name: figures[name] for name in FIGURES if name in figures}
             self.state = "stopped" if outcome.stopped else "done"
         self.live.picture = b""
 
     def as_dict(self, place: int) -> dict[str, Any]:
         """Return the state for JSON; ``place``: the number of runs before it."""
-        names = ("id", "number", "image", "values", "command", "state", "error", "figures")
+        names = ("id", "number", "image", "state", "error", "figures")
         found = {name: getattr(self, name) for name in names}
+        found |= {"values": self.order.values, "command": self.order.command}
         if self.state == "waiting":
             found["place"] = place
         elif self.state == "running":
             found |= {"live": self.live.as_dict(), "stopping": self.stopping.is_set()}
         return found
-
-
-@dataclass(eq=False)
-class Session:
-    """A page: its images and runs, oldest first."""
-
-    id: str
-    seen: float
-    """Time at which it was opened, or its last reader left [s]."""
-    readers: int = 0
-    """Open streams of events."""
-    runs_started: int = 0
-    uploads: dict[str, Upload] = field(default_factory=dict)
-    runs: dict[str, QueuedRun] = field(default_factory=dict)
-
-    def runs_of(self, image: str) -> list[QueuedRun]:
-        """Return the runs of an image."""
-        return [run for run in self.runs.values() if run.image == image]
-
-    def as_dict(self, places: Mapping[QueuedRun, int]) -> dict[str, Any]:
-        """Return the state for JSON; ``places``: for each waiting run, the number of runs before it."""
-        return {
-            "images": [{"id": name} | upload.as_dict() for name, upload in self.uploads.items()],
-            "runs": [run.as_dict(places.get(run, 0)) for run in self.runs.values()],
-        }
