@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import textwrap
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +27,6 @@ suggest_option = option_in(
     is_flag=True,
     help="Suggest how many shapes the image is worth, and why, instead of making a file.",
 )
-
-
-TWICE = 1.9
-"""Ratio of shapes from which a row has about twice as many as the row before."""
 
 
 def suggest_number(request: Request, given: dict[str, Any]) -> None:
@@ -66,10 +63,9 @@ def _lines(name: str, made: Suggestion) -> list[str]:
     if made.curves is None:
         return [f"{name}: {made.why}"]
     lines = [f"{name}: {counted(made.curves, 'shape')}", "    shapes     dB      kB   twice as many buy"]
-    for i, one in enumerate(made.expected):
-        more = made.expected[i + 1] if i + 1 < len(made.expected) else None
+    for one, more in zip_longest(made.expected, made.expected[1:]):
         buys = ""
-        if more and more.shapes >= TWICE * one.shapes:
+        if more:
             buys = f"{more.psnr - one.psnr:+.1f} dB for {(more.bytes - one.bytes) / 1000:.0f} kB more"
         mark = "->" if one.shapes == made.curves else "  "
         lines.append(f"  {mark}{one.shapes:6}  {one.psnr:5.1f}  {one.bytes / 1000:6.1f}   {buys}".rstrip())

@@ -25,7 +25,6 @@ from warpsplat.kernels.tile import total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
 
 
@@ -186,7 +185,9 @@ def make_removal_cost(column: Any) -> wp.Kernel:
                     slot = -1 - slot
                 if paint[3] < 0.0:
                     seen = wp.cw_mul(seen, paint_columns[slot, 3, x])
-                lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
+                lit = wp.min(
+                    wp.max(constants.STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one
+                )
                 transmittance = transmittance - seen
                 red_seen = paint_times(paint, 0, seen)
                 green_seen = paint_times(paint, 1, seen)

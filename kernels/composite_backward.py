@@ -16,7 +16,6 @@ from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 STEEPER = wp.constant(1.0e30)  # the same for coverages, which may be so small that they are not seen
 TINY = wp.constant(1.0e-9)
 
@@ -27,7 +26,7 @@ def slope_of(mapping: wp.int32, signed: Any):
     one = type(signed)(1.0)
     slope = one - wp.abs(signed)
     if mapping == constants.AREA:
-        slope = wp.min(STEEP * slope, one)
+        slope = wp.min(constants.STEEP * slope, one)
         slope = wp.cw_mul(slope, wp.min(wp.max(STEEPER * signed, -one), one))
     return slope
 
@@ -118,7 +117,9 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
                 seen = wp.cw_mul(transmittance, alpha)
                 behind = behind - wp.cw_mul(alpha, share)
                 # Where hardly any light is left, there is only rounding error; Adam would make steps of it.
-                lit = wp.min(wp.max(STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one)
+                lit = wp.min(
+                    wp.max(constants.STEEP * (transmittance - constants.TRANSMITTANCE_MIN * one), zero), one
+                )
                 alpha_grad = wp.cw_mul(lit, share - wp.cw_div(behind, wp.max(one - alpha, least)))
                 transmittance = transmittance - seen
                 if not full:

@@ -20,7 +20,6 @@ from warpsplat.kernels.tile import tile_column, total
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 TINY = wp.constant(1.0e-9)
 
 
@@ -46,7 +45,7 @@ def premultiplied_grads(
     divisor = wp.max(opaque, constants.NOTHING * one)
     above = wp.min(opaque / constants.NOTHING, one)
     opacity_grad = image_grad[tile, 3, x] - wp.cw_mul(wp.cw_div(along, divisor), above)
-    partly = wp.min(STEEP * (one - touched), one)
+    partly = wp.min(constants.STEEP * (one - touched), one)
     hit_grad = wp.cw_mul(wp.cw_div(along, wp.max(touched, constants.NOTHING * one)), partly)
     return wp.cw_div(touched, divisor), opacity_grad, hit_grad
 

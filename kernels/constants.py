@@ -146,3 +146,6 @@ CACHEABLE = 1
 
 CACHED = 2
 """... and showed the same shapes in the last pass, so that its pixels and loss are still valid."""
+
+STEEP = 1.0e9
+"""Makes a step of a difference, which is then clamped: vectors have no comparisons."""

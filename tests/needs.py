@@ -15,12 +15,13 @@ from warpsplat.extensions import extensions
 
 WORDS = {
     "batch": {"batch", "several images"},
+    "compare": {"compare"},
     "inkscape": {"inkscape"},
     "motion": {"animate", "preview"},
     "pages": {"serve", "report"},
     "paper": {"splat", "gaussian"},
     "pydiffvg": {"pydiffvg"},
-    "tools": {"bench", "compare", "doctor", "info"},
+    "tools": {"bench", "doctor", "info"},
     "torch": {"torch", "tensors"},
 }
 """Extension -> words that parameters of its tests have, and commands of its."""

@@ -24,8 +24,10 @@ def test_every_package_and_every_file_of_data_is_found() -> None:
         for name in names
         if "__pycache__" not in folder
     ]
-    found = find_packages(str(ROOT), include=build["packages"]["find"]["include"])
-    assert sorted({".".join(path.parent.parts) for path in files if path.suffix == ".py"}) == sorted(found)
+    rules = build["packages"]["find"]
+    found = find_packages(str(ROOT), include=rules["include"], exclude=rules["exclude"])
+    folders = {".".join(path.parent.parts) for path in files if path.suffix == ".py"}
+    assert sorted(folders - set(rules["exclude"])) == sorted(found)
     listed = [
         str(Path(*package.split("."), pattern))
         for package, patterns in build["package-data"].items()

@@ -23,7 +23,6 @@ from warpsplat.kernels.paint.gradient import (
     to_unit_adjoint,
 )
 from warpsplat.kernels.paint.gradient_forward import (
-    STEEP,
     roots,
     rows,
     share_of_next,
@@ -89,8 +88,8 @@ def chain_backward_column(
                 step = step + (g.stop_opacities[k + 1] - g.stop_opacities[k]) * opacity
                 step = step / (after - before)
                 # Beyond the two stops nothing changes with t.
-                step = wp.cw_mul(step, wp.min(STEEP * share, type(t)(1.0)))
-                step = wp.cw_mul(step, wp.min(STEEP * (type(t)(1.0) - share), type(t)(1.0)))
+                step = wp.cw_mul(step, wp.min(constants.STEEP * share, type(t)(1.0)))
+                step = wp.cw_mul(step, wp.min(constants.STEEP * (type(t)(1.0) - share), type(t)(1.0)))
                 later = total(wp.cw_mul(share, step))
                 if own_before == 1:
                     stop_offsets_grad[k] = stop_offsets_grad[k] + (later - total(step))
@@ -279,8 +278,8 @@ def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
                         slope = between[0] * g_red + between[1] * g_green + between[2] * g_blue
                         slope = (slope + opacity_between * g_opacity) / width
                         # Beyond the stops nothing changes with t.
-                        slope = wp.cw_mul(slope, wp.min(STEEP * share, one))
-                        slope = wp.cw_mul(slope, wp.min(STEEP * (one - share), one))
+                        slope = wp.cw_mul(slope, wp.min(constants.STEEP * share, one))
+                        slope = wp.cw_mul(slope, wp.min(constants.STEEP * (one - share), one))
                         by_t = by_t + slope
                         by_t_high = by_t_high + wp.cw_mul(share, slope)
                     else:

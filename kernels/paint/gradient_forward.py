@@ -28,8 +28,6 @@ from warpsplat.kernels.paint.gradient import (
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STEEP = wp.constant(1.0e9)  # makes a step of a clamped share
-
 
 @wp.func
 def rows(column: Any):
@@ -64,7 +62,7 @@ def share_of_next(t: Any, before: wp.float32, after: wp.float32):
     if after > before:
         return share_of_second(t, before, after - before)
     one = type(t)(1.0)
-    return wp.min(wp.max(STEEP * (t - type(t)(before)) + one, type(t)(0.0)), one)
+    return wp.min(wp.max(constants.STEEP * (t - type(t)(before)) + one, type(t)(0.0)), one)
 
 
 @wp.func

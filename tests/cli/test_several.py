@@ -15,8 +15,8 @@ import warpsplat
 from tests.cli.helpers import run
 from warpsplat.cli.main import main
 from warpsplat.fit.progress import Progress
-from warpsplat.run.suggest import suggestion
-from warpsplat.search.survey import Worth
+from warpsplat.fit.settings import PRESETS
+from warpsplat.run.suggest import Expected, Suggestion, choose
 
 FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 
@@ -130,8 +130,8 @@ def test_fits_to_a_drawing_start_from_scratch(tmp_path: Path, noise: int) -> Non
 
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpsplat.search.survey.SHORT_STEPS", 60)
-    monkeypatch.setattr("warpsplat.search.survey.SHORT_INTERVAL", 10)
+    monkeypatch.setitem(PRESETS["draft"], "iterations", 40)
+    monkeypatch.setattr("warpsplat.run.suggest.FEWEST_SHAPES", 16)
 
 
 @pytest.mark.usefixtures("quickly")
@@ -139,47 +139,58 @@ def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = os.listdir(image.parent)
     assert run("vectorize", image, "--suggest", "--open", "--json", "--device", "cpu") == 0
     values = json.loads(capsys.readouterr().out)
-    assert 16 <= values["curves"] <= 300
+    drafts = values["expected"]
+    assert [one["shapes"] for one in drafts] == [16 * 2**i for i in range(len(drafts))]
+    assert [one["bytes"] for one in drafts] == sorted(one["bytes"] for one in drafts)
+    assert drafts[0]["psnr"] < drafts[-1]["psnr"]
+    assert (values["curves"], values["why"]) == choose([Expected(**one) for one in drafts])
     assert values["command"] == f"warpsplat vectorize {image} --curves {values['curves']} --open -o photo.svg"
-    assert values["curves"] in [row["shapes"] for row in values["expected"]]
-    assert "shapes should give" in values["why"]
     assert os.listdir(image.parent) == before
+
+
+@pytest.mark.usefixtures("quickly")
+def test_a_suggestion_stops_when_asked(image: Path) -> None:
+    assert warpsplat.suggest(image, device="cpu", stop=lambda: True) is None
+
+
+def series(*figures: tuple[int, float, int]) -> tuple[Expected, ...]:
+    return tuple(Expected(*one) for one in figures)
 
 
 def test_a_suggestion_in_words(
     image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = suggestion(Worth(16, 1024, 256, 26.0, 1.0, 0.0, 64.0))
+    drafts = series((64, 25.0, 7_000), (128, 26.0, 14_000), (256, 26.5, 28_000))
+    made = Suggestion(128, "photo", choose(drafts)[1], drafts, 1.0)
     monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"{image}: {made.curves} shapes"
-    assert any(line.startswith("  ->") and "+1.0 dB for" in line for line in lines)
-    assert lines[-1].strip() == f"warpsplat vectorize {image} --curves {made.curves} -o photo.svg"
+    assert lines[0] == f"{image}: 128 shapes"
+    assert lines[2].endswith("+1.0 dB for 7 kB more") and lines[3].startswith("  ->   128   26.0    14.0")
+    assert lines[-1].strip() == f"warpsplat vectorize {image} --curves 128 -o photo.svg"
 
 
 @pytest.mark.parametrize(
-    ("worth", "curves", "words"),
+    ("drafts", "curves", "words"),
     [
-        # Decibels a shape are 2 / (shapes ln 2): a hundred buy half of one at 577, 10 kB (156 shapes) at 902.
-        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 64.0), 580, "Up to there 100 more buy 0.5 dB at least"),
-        (Worth(16, 1024, 256, 20.0, 0.8, 0.0, 64.0), 230, ""),
-        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "10 kB more buy 0.5 dB"),
-        (Worth(16, 1024, 256, 26.0, 2.0, 0.0, 200.0), 290, "twice as many 2.0 dB more"),
-        (Worth(7, 7, 7, 20.0, 0.0, 0.0, 64.0), 7, "no room for more than 7 shapes"),
-        (Worth(16, 99, 99, 20.0, 0.0, 0.0, 64.0), 16, "100 more buy less than 0.5 dB"),
-        (Worth(16, 99, 99, 20.0, 2.0, 0.0, 64.0), 99, "All the way to 99 shapes 100 more buy 0.5 dB"),
-        (Worth(16, 32, 32, 99.0, 2.0, 0.0, 64.0), 16, "more are expected to add nothing"),
+        (((64, 25.0, 7_000), (128, 25.3, 14_000)), 64, "Twice as many buy 0.3 dB for 7 kB more"),
+        (((64, 25.0, 7_000), (128, 25.4, 14_000)), 128, "Up to 128 shapes, twice as many always"),
+        (((64, 25.0, 7_000), (128, 26.0, 14_000), (256, 26.6, 28_000)), 128, "0.6 dB for 14 kB more"),
+        (
+            ((64, 25.0, 7_000), (128, 24.0, 14_000)),
+            64,
+            "less than 0.5 dB, about the least that can be seen, for each 10 kB",
+        ),
+        (((64, float("inf"), 900), (128, float("inf"), 900)), 64, ""),
+        (((7, 20.0, 900),), 7, "no room for more than 7 shapes"),
     ],
 )
-def test_more_shapes_than_are_worth_it_are_not_suggested(worth: Worth, curves: int, words: str) -> None:
-    made = suggestion(worth)
-    assert made.curves == curves and words in made.why
-    assert curves in [one.shapes for one in made.expected]
-    for one in made.expected:
-        expected = worth.psnr_there + worth.slope * np.log2(one.shapes / worth.measured)
-        assert one.psnr == pytest.approx(expected, abs=0.01)
+def test_more_shapes_than_are_worth_it_are_not_suggested(
+    drafts: tuple[tuple[int, float, int], ...], curves: int, words: str
+) -> None:
+    chosen, why = choose(series(*drafts))
+    assert chosen == curves and words in why
 
 
 def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from warpsplat.motion.escapes import half_blocks, kitty, picture_escapes, sixels
-from warpsplat.motion.terminal import Terminal
+from warpsplat.motion.escapes import half_blocks, iterm, kitty
 
 
 def picture(width: int, height: int, *, smooth: bool = False) -> np.ndarray:
@@ -20,7 +19,7 @@ def picture(width: int, height: int, *, smooth: bool = False) -> np.ndarray:
         y, x = np.mgrid[:height, :width] / max(width, height)
         return np.round(255 * np.stack([x, y, 1 - x], axis=2)).astype(np.uint8)
     rng = np.random.default_rng(1)
-    colors = np.array([[0, 0, 0], [255, 0, 95], [175, 215, 255], [118, 118, 118]], np.uint8)
+    colors = np.array([[0, 0, 0], [255, 0, 95], [175, 215, 255], [135, 135, 135]], np.uint8)
     return colors[rng.integers(0, 4, (height, width))]
 
 
@@ -43,8 +42,6 @@ def xterm(color: str) -> list[int]:
     kind, *values = map(int, color.split(";"))
     if kind == 2:
         return values
-    if values[0] >= 232:
-        return [8 + 10 * (values[0] - 232)] * 3
     steps = (0, 95, 135, 175, 215, 255)
     return [steps[(values[0] - 16) // place % 6] for place in (36, 6, 1)]
 
@@ -60,42 +57,9 @@ def test_half_blocks(true_color: bool) -> None:
     assert len(half_blocks(uniform, true_color=true_color)[0]) < 100, "a style only where it changes"
 
 
-def read_sixels(text: str) -> np.ndarray:
-    found = re.fullmatch(r'\x1bP0;1q"1;1;(\d+);(\d+)(.*)\x1b\\', text, re.DOTALL)
-    assert found
-    width, height = int(found[1]), int(found[2])
-    image, palette = np.full((height + 5, width, 3), -1), {}
-    left = top = color = 0
-    for token in re.findall(r"#\d+;2;\d+;\d+;\d+|#\d+|!\d+.|[?-~]|[$-]", found[3]):
-        if token[0] == "#":
-            color, *definition = map(int, token[1:].split(";"))
-            if definition:
-                palette[color] = [round(255 * share / 100) for share in definition[1:]]
-        elif token == "$":
-            left = 0
-        elif token == "-":
-            left, top = 0, top + 6
-        else:
-            count = int(token[1:-1]) if token[0] == "!" else 1
-            for row in range(6):
-                if ord(token[-1]) - 63 >> row & 1:
-                    image[top + row, left : left + count] = palette[color]
-            left += count
-    assert (image[:height] >= 0).all() and (image[height:] == -1).all(), "every pixel, and no more"
-    return image[:height]
-
-
-@pytest.mark.parametrize(("width", "height"), [(37, 25), (6, 6), (1, 1)])
-def test_sixels(width: int, height: int) -> None:
-    few, many = picture(width, height), picture(width, height, smooth=True)
-    assert np.abs(read_sixels(sixels(Image.fromarray(few))) - few).max() <= 2
-    assert np.abs(read_sixels(sixels(Image.fromarray(many))) - many).mean() < 8
-    assert len(re.sub(r"#\d+;[\d;]*", "", sixels(Image.new("RGB", (400, 6), "red")))) < 60, "runs are counted"
-
-
 def test_kitty() -> None:
     image = np.random.default_rng(0).integers(0, 256, (60, 50, 3)).astype(np.uint8)
-    text = kitty(Image.fromarray(image), 10, 4, 7)
+    text = kitty(image, 10, 4, 7)
     found = re.findall(r"\x1b_G([^;]*);([^\x1b]*)\x1b\\", text)
     assert len(found) > 2 and "".join(f"\x1b_G{keys};{data}\x1b\\" for keys, data in found) == text
     assert found[0][0] == "a=T,f=100,i=7,p=1,c=10,r=4,C=1,q=2,m=1"
@@ -105,14 +69,9 @@ def test_kitty() -> None:
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(packed))), image)
 
 
-@pytest.mark.parametrize("tmux", [False, True])
-def test_iterm(tmux: bool) -> None:
-    """Sequences are wrapped for tmux."""
+def test_iterm() -> None:
     image = picture(20, 10)
-    text = picture_escapes(Terminal("iterm", 20, 10, (10, 20), tmux=tmux), image, 4, 1, 1)
-    if tmux:
-        assert text.startswith("\x1bPtmux;\x1b") and text.endswith("\x1b\\")
-        text = text[len("\x1bPtmux;\x1b") : -len("\x1b\\")]
+    text = iterm(image, 4, 1)
     found = re.fullmatch(r"\x1b\]1337;File=inline=1;size=(\d+);width=4;height=1;[^:]*:([^\x07]*)\x07", text)
     assert found
     packed = base64.b64decode(found[2], validate=True)

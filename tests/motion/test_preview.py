@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import io
+import os
 import re
-from dataclasses import replace
+import shutil
+import struct
 
 import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene
 from warpsplat.fit.progress import Progress, Snapshot
-from warpsplat.motion.preview import TIME_SHARE, Preview, picture_size, resized
-from warpsplat.motion.terminal import BLOCK_CELL, Protocol, Terminal
+from warpsplat.motion import preview
+from warpsplat.motion.preview import (
+    TIME_SHARE,
+    Preview,
+    Protocol,
+    best_protocol,
+    has_true_color,
+    picture_size,
+    resized,
+    terminal_size,
+)
 from warpsplat.scene import FloatArray
 
 COLUMNS, LINES = 60, 12
@@ -20,7 +31,12 @@ ROWS = LINES - 4
 RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 
 
-class Screen(io.StringIO):
+class Tty(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Screen(Tty):
     """Rows of characters with their colours, of which the last ``LINES`` are visible; and a cursor."""
 
     def __init__(self) -> None:
@@ -76,12 +92,11 @@ def flat(color: tuple[int, int, int]) -> FloatArray:
 
 
 class Shown:
-    """A preview on ``screen`` with a clock and a terminal that tests set."""
+    """A preview on ``screen`` with a clock that tests set."""
 
-    def __init__(self, screen: io.StringIO, **others: object) -> None:
+    def __init__(self, screen: io.StringIO, protocol: Protocol = "blocks") -> None:
         self.now = 100.0
-        self.terminal = replace(Terminal("blocks", COLUMNS, LINES, BLOCK_CELL), **others)
-        self.preview = Preview(screen, lambda: self.terminal, lambda: self.now)
+        self.preview = Preview(screen, protocol, lambda: self.now)
 
     def update(self, color: tuple[int, int, int], seconds: float = 10.0, draws: float = 0.0) -> None:
         """Update; then ``seconds`` pass, and ``draws`` within."""
@@ -92,6 +107,15 @@ class Shown:
 
         self.preview.update(Progress(1, 2, 20.0, 0.0, 0.5, True, 3, Snapshot(mixed_scene, image)))
         self.now += seconds
+
+
+@pytest.fixture(autouse=True)
+def size(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The size of terminals, which tests set."""
+    now = [COLUMNS, LINES]
+    monkeypatch.setattr(preview, "terminal_size", lambda stream: os.terminal_size(now))
+    monkeypatch.setenv("COLORTERM", "truecolor")
+    return now
 
 
 @pytest.fixture
@@ -126,22 +150,22 @@ def test_lines_below_the_picture_stay(screen: Screen) -> None:
     assert screen.text(ROWS) == "notice" and screen.text(ROWS + 1)[0] == "▀"
 
 
-def test_a_resized_terminal_gets_a_new_picture(screen: Screen) -> None:
+def test_a_resized_terminal_gets_a_new_picture(screen: Screen, size: list[int]) -> None:
     shown = Shown(screen)
     shown.update(RED)
-    shown.terminal = Terminal("blocks", 20, 10, BLOCK_CELL)
+    size[:] = 20, 10
     shown.update(BLUE)
     assert sum("255;0;0" in style for style in screen.pictures()) == ROWS
     assert sum("0;0;255" in style for style in screen.pictures()) == 10 - 4
     before = screen.pictures()
-    shown.terminal = Terminal("blocks", 5, 2, BLOCK_CELL)
+    size[:] = 5, 2
     shown.update(GREEN)
     assert screen.pictures() == before, "too small for a picture"
 
 
 def test_drawing_takes_a_small_part_of_the_time() -> None:
     """The interval depends on the last two costs; the first update and a single slow one do not count."""
-    shown, drawn = Shown(io.StringIO()), []
+    shown, drawn = Shown(Tty()), []
     costs = [2.0, 0.1, 0.1, 5.0, *[0.1] * 1000]
     while shown.now < 300:
         before = shown.now
@@ -156,7 +180,7 @@ def test_drawing_takes_a_small_part_of_the_time() -> None:
 
 def test_a_pipe_gets_the_finished_picture_only() -> None:
     out = io.StringIO()
-    shown = Shown(out, live=False)
+    shown = Shown(out)
     shown.update(RED)
     assert not out.getvalue()
     shown.preview.finish(flat(RED), None)
@@ -167,10 +191,10 @@ def test_a_pipe_gets_the_finished_picture_only() -> None:
     shown.preview.finish(flat(RED), None)  # a closed stream is ignored
 
 
-@pytest.mark.parametrize(("protocol", "end"), [("kitty", "\x1b\\"), ("iterm", "\x07"), ("sixel", "\x1b\\")])
-def test_pixel_protocols_draw_in_the_same_place(protocol: str, end: str) -> None:
-    out = io.StringIO()
-    shown = Shown(out, protocol=protocol, cell=(10, 20))
+@pytest.mark.parametrize(("protocol", "end"), [("kitty", "\x1b\\"), ("iterm", "\x07")])
+def test_pixel_protocols_draw_in_the_same_place(protocol: Protocol, end: str) -> None:
+    out = Tty()
+    shown = Shown(out, protocol)
     shown.update(RED)
     shown.update(BLUE)
     begin, *pictures = out.getvalue().split("\x1b7")
@@ -182,22 +206,50 @@ def test_pixel_protocols_draw_in_the_same_place(protocol: str, end: str) -> None
         assert len(numbers) == 2 and len(set(numbers)) == 1, "so the second replaces the first"
 
 
-@pytest.mark.parametrize("protocol", ["kitty", "sixel", "blocks"])
 @pytest.mark.parametrize(("width", "height"), [(300, 200), (20, 400), (4000, 10)])
 @pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (10, 8)])
-def test_pictures_fit_in_their_proportions(
-    protocol: Protocol, width: int, height: int, columns: int, lines: int
-) -> None:
-    cell = BLOCK_CELL if protocol == "blocks" else (9, 18)
-    size = picture_size(Terminal(protocol, columns, lines, cell), width, height)
+def test_pictures_fit_in_their_proportions(width: int, height: int, columns: int, lines: int) -> None:
+    size = picture_size(os.terminal_size((columns, lines)), width, height)
     assert size and 1 <= size[0] < columns and 1 <= size[1] <= lines - 4
-    across, down = size[0] * cell[0], size[1] * cell[1]
-    assert protocol != "sixel" or max(across, down) <= 800
+    across, down = size[0], 2 * size[1]
     zoom = min(across / width, down / height)
-    for side, drawn, unit in ((width, across, cell[0]), (height, down, cell[1])):
+    for side, drawn, unit in ((width, across, 1), (height, down, 2)):
         assert abs(side * zoom - drawn) <= unit * (1 + side / min(width, height))
 
 
 def test_transparency_is_white() -> None:
     image = np.full((4, 4, 4), (0, 0.25, 0, 0.5), np.float32)  # premultiplied
     assert (resized(image, 4, 4) == (128, 191, 128)).all()
+
+
+@pytest.mark.parametrize(
+    ("environ", "protocol", "true_color"),
+    [
+        ({"TERM": "xterm-kitty"}, "kitty", False),
+        ({"KITTY_WINDOW_ID": "1"}, "kitty", False),
+        ({"TERM_PROGRAM": "ghostty", "COLORTERM": "24bit"}, "kitty", True),
+        ({"TERM_PROGRAM": "iTerm.app"}, "iterm", False),
+        ({"LC_TERMINAL": "iTerm2"}, "iterm", False),
+        ({"TERM": "tmux-256color", "TMUX": "/tmp/x", "KITTY_WINDOW_ID": "1"}, "blocks", False),
+        ({"TERM": "screen", "TERM_PROGRAM": "iTerm.app"}, "blocks", False),
+        ({"TERM": "xterm-direct"}, "blocks", True),
+        ({"WT_SESSION": "1"}, "blocks", True),
+        ({}, "blocks", False),
+    ],
+)
+def test_abilities_by_environment(
+    environ: dict[str, str], protocol: str, true_color: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "environ", {"TERM": "xterm-256color"} | environ)
+    assert (best_protocol(), has_true_color()) == (protocol, true_color)
+
+
+def test_current_size() -> None:
+    """That of the stream's own terminal; without one, that of the process's."""
+    fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
+    primary, secondary = pty.openpty()
+    with os.fdopen(secondary, "w") as stream, os.fdopen(primary, "rb"):
+        for lines, columns in ((30, 100), (10, 50)):
+            fcntl.ioctl(primary, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+            assert terminal_size(stream) == (columns, lines)
+    assert terminal_size(io.StringIO()) == shutil.get_terminal_size()

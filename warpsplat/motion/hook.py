@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warpsplat.motion.recorder import Recorder
     from warpsplat.run.result import Result
 
-PROTOCOLS = ("auto", "kitty", "iterm", "sixel", "blocks")
+PROTOCOLS = ("auto", "kitty", "iterm", "blocks")
 
 
 class MotionHook(RunHook):
@@ -60,7 +60,7 @@ class MotionHook(RunHook):
     }
 
     def __init__(
-        self, animate: Path | None, animate_what: Any, animate_width: int | None, preview: str | None
+        self, animate: Path | None, animate_what: Any, animate_width: int | None, preview: Any
     ) -> None:
         self._file, self._what, self._width, self._protocol = animate, animate_what, animate_width, preview
         self._recorder: Recorder | None = None

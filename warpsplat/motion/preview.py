@@ -7,10 +7,11 @@ import logging
 import math
 import os
 import secrets
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Literal, TextIO
 
 import cv2
 import numpy as np
@@ -19,11 +20,24 @@ from warpsplat.cli.echo import echo
 from warpsplat.errors import ImageError
 from warpsplat.files.sources import image_of
 from warpsplat.fit.progress import Progress
-from warpsplat.motion.escapes import HALF, Pixels, picture_escapes
-from warpsplat.motion.terminal import Terminal, detect
+from warpsplat.motion.escapes import HALF, Pixels, half_blocks, iterm, kitty
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import premultiplied, render_svg
+
+Protocol = Literal["kitty", "iterm", "blocks"]
+"""Kitty's graphics protocol, iTerm2's inline images, or half-block characters."""
+
+BY_TERM_PROGRAM: dict[str, Protocol] = {
+    **dict.fromkeys(("iterm.app", "wezterm", "mintty"), "iterm"),
+    **dict.fromkeys(("ghostty", "kitty"), "kitty"),
+}
+
+BY_TERM: dict[str, Protocol] = dict.fromkeys(("xterm-kitty", "xterm-ghostty"), "kitty")
+"""TERM is the only one of these variables that ssh passes on."""
+
+CELLS = {"blocks": (1, 2), "iterm": (10, 20), "kitty": (10, 20)}
+"""Width and height of a character [px of the picture]; terminals scale pictures of pixels to their own."""
 
 TIME_SHARE = 0.05
 """Share of a run's time for drawing: the interval between two updates depends on how long one takes."""
@@ -42,9 +56,6 @@ MAX_ROWS = 32
 OTHER_LINES = 4
 """Lines of the terminal that stay free."""
 
-MAX_SIXEL_SIDE = 800
-"""Longer side of a picture of sixels [px]."""
-
 MIN_COLUMNS, MIN_LINES = 8, 7
 """Smallest useful terminal."""
 
@@ -56,11 +67,11 @@ class Preview:
     """Draws on a stream; during a run, above the line with the cursor, which is the progress bar's."""
 
     def __init__(
-        self, stream: TextIO, measure: Callable[[], Terminal], clock: Callable[[], float] = time.perf_counter
+        self, stream: TextIO, protocol: Protocol, clock: Callable[[], float] = time.perf_counter
     ) -> None:
-        """``measure``: returns the terminal with its current size."""
-        self._stream, self._measure, self._clock = stream, measure, clock
-        self._terminal: Terminal | None = None
+        self._stream, self._protocol, self._clock = stream, protocol, clock
+        self._live = stream.isatty()
+        self._size: os.terminal_size | None = None
         self._rows = 0
         """Height of the picture above the cursor; 0: there is none."""
         self._next, self._cost = 0.0, math.inf
@@ -71,9 +82,8 @@ class Preview:
         begun = self._clock()
         if progress.snapshot is None or begun < self._next:
             return
-        terminal = self._measure()
-        if terminal.live:
-            self._draw(progress.snapshot.image(), None, terminal)
+        if self._live:
+            self._draw(progress.snapshot.image(), None)
         now = self._clock()
         previous, self._cost = self._cost, now - begun
         wait = min(previous, self._cost) * (1 / TIME_SHARE - 1)  # a single slow update is no measure
@@ -90,28 +100,37 @@ class Preview:
 
         Pictures have values in [0, 1] and shapes (height, width, 3), or (height, width, 4) premultiplied.
         """
-        self._draw(image, source, self._measure())
+        self._draw(image, source)
 
-    def _draw(self, image: FloatArray, source: FloatArray | None, terminal: Terminal) -> None:
-        if terminal != self._terminal:  # after a change of size, the old picture can be anywhere
-            self._terminal, self._rows = terminal, 0
+    def _draw(self, image: FloatArray, source: FloatArray | None) -> None:
+        terminal = terminal_size(self._stream)
+        if terminal != self._size:  # after a change of size, the old picture can be anywhere
+            self._size, self._rows = terminal, 0
+        across, down = CELLS[self._protocol]
         size = picture_size(terminal, image.shape[1], image.shape[0])
         if size is None:
             return
         columns, rows = size
-        across, down = terminal.cell
         pixels = resized(image, columns * across, rows * down)
         if source is not None and 2 * columns + 1 < terminal.columns:
             gap = np.zeros((rows * down, across, 3), np.uint8)
             pixels = np.concatenate([resized(source, columns * across, rows * down), gap, pixels], axis=1)
             columns = 2 * columns + 1
-        text = picture_escapes(terminal, pixels, columns, rows, self._number)
-        if not terminal.live:
+        text = self._escapes(pixels, columns, rows)
+        if not self._live:
             self._write(text + "\n")
             return
         begin = "" if self._rows == rows else "\r\x1b[2K" + rows * "\n"
         self._rows = rows
         self._write(f"{begin}{SAVE_CURSOR}\r\x1b[{rows}A{text}{RESTORE_CURSOR}")
+
+    def _escapes(self, pixels: Pixels, columns: int, rows: int) -> str:
+        if self._protocol == "kitty":
+            return kitty(pixels, columns, rows, self._number)
+        if self._protocol == "iterm":
+            return iterm(pixels, columns, rows)
+        lines = half_blocks(pixels, true_color=not self._live or has_true_color())
+        return ("\r\x1b[1B" if self._live else "\n").join(lines)
 
     def _write(self, text: str) -> None:
         with contextlib.suppress(OSError, ValueError):  # a closed stream must not end the run
@@ -119,21 +138,26 @@ class Preview:
             self._stream.flush()
 
 
-def picture_size(terminal: Terminal, width: int, height: int) -> tuple[int, int] | None:
+def terminal_size(stream: TextIO) -> os.terminal_size:
+    """Return the current columns and lines of a stream's terminal, or else of the process's."""
+    with contextlib.suppress(OSError, ValueError):
+        size = os.get_terminal_size(stream.fileno())
+        if all(size):
+            return size
+    return shutil.get_terminal_size()
+
+
+def picture_size(terminal: os.terminal_size, width: int, height: int) -> tuple[int, int] | None:
     """Return columns and rows of a picture: as large as fits, in its proportions.
 
     None if the terminal is too small.
     """
     if terminal.columns < MIN_COLUMNS or terminal.lines < MIN_LINES:
         return None
-    across, down = terminal.cell
     rows = min(terminal.lines - OTHER_LINES, MAX_ROWS)
     columns = terminal.columns - 1  # some terminals wrap after the last one
-    if terminal.protocol == "sixel":
-        rows, columns = min(rows, MAX_SIXEL_SIDE // down), min(columns, MAX_SIXEL_SIDE // across)
-    zoom = min(columns * across / width, rows * down / height)
-    size = round(width * zoom / across), round(height * zoom / down)
-    return max(1, min(size[0], columns)), max(1, min(size[1], rows))
+    zoom = min(columns / width, 2 * rows / height)  # a character is twice as high as it is wide
+    return min(max(1, round(width * zoom)), columns), min(max(1, round(height * zoom / 2)), rows)
 
 
 def resized(image: FloatArray, width: int, height: int) -> Pixels:
@@ -145,23 +169,41 @@ def resized(image: FloatArray, width: int, height: int) -> Pixels:
     return np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8)
 
 
-def start_preview(stream: TextIO, protocol: Any) -> Preview | None:
+def best_protocol() -> Protocol:
+    """Return the terminal's best protocol, by the environment."""
+    term, program = os.environ.get("TERM", ""), os.environ.get("TERM_PROGRAM", "").lower()
+    if "TMUX" in os.environ or term.startswith(("screen", "tmux")) or os.name == "nt":
+        return "blocks"
+    if "KITTY_WINDOW_ID" in os.environ:
+        return "kitty"
+    if os.environ.get("LC_TERMINAL") == "iTerm2":  # ssh may pass it on
+        return "iterm"
+    return BY_TERM_PROGRAM.get(program) or BY_TERM.get(term) or "blocks"
+
+
+def has_true_color() -> bool:
+    """Tell whether characters can have 24-bit colours; otherwise they have xterm's 256."""
+    announced = os.environ.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
+    return announced or "direct" in os.environ.get("TERM", "") or "WT_SESSION" in os.environ
+
+
+def start_preview(stream: TextIO, protocol: Protocol | None) -> Preview | None:
     """Return a preview on ``stream`` by ``protocol``, or by the best one for the terminal.
 
     Returns None, after a notice that says why, if the stream cannot show pictures.
     """
-    terminal = detect(stream, protocol)
     problem = ""
-    if terminal is None:
+    if protocol is None and (not stream.isatty() or os.environ.get("TERM") == "dumb"):
         problem = "stderr is not a terminal that shows pictures; --preview=blocks prints them"
-    elif terminal.protocol == "blocks" and not _can_encode(stream, HALF):
+    protocol = protocol or best_protocol()
+    if not problem and protocol == "blocks" and not _can_encode(stream, HALF):
         problem = f"the terminal's encoding, {stream.encoding}, has no half blocks"
-    if terminal is None or problem:
+    if problem:
         echo(f"warpsplat: --preview: {problem}", err=True)
         return None
     if os.name == "nt":
         os.system("")  # makes Windows consoles interpret escape sequences
-    preview = Preview(stream, lambda: terminal.remeasured(stream))
+    preview = Preview(stream, protocol)
     log = logging.getLogger("warpsplat")
     log.handlers = [handler for handler in log.handlers if not isinstance(handler, _NoticeHandler)]
     log.addHandler(_NoticeHandler(preview))

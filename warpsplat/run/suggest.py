@@ -1,50 +1,37 @@
-"""Suggest how many shapes an image is worth: as many as still gain what can be seen for their bytes."""
+"""Suggest how many shapes an image is worth, by drafts with more and more shapes."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import UsageError, counted
 from warpsplat.field_docs import described
 from warpsplat.files.sources import ImageSource
-from warpsplat.fit.problem import Run
+from warpsplat.fit.loop import fit
+from warpsplat.fit.place import simple_curves
+from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import SUBJECTS, Settings, Subject
-from warpsplat.portable import elementary
 from warpsplat.run.arguments import backend_on, settings_given, takes
 from warpsplat.run.prepare import prepare
 from warpsplat.run.typed import Options
-from warpsplat.search.survey import Worth, survey
+from warpsplat.search.candidate import measured
+from warpsplat.search.goal import draft_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-ROW_RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Shapes of the rows of a table, over the suggested number."""
-
-GAIN_SAMPLES = 513
-"""Numbers of shapes at which the gain is evaluated."""
-
-VISIBLE_GAIN = 0.5
-"""Least gain that can be seen [dB]: a rule of thumb of image coding."""
-
-MORE_SHAPES, MORE_BYTES = 100, 10_000
-"""Shapes, and bytes, that have to gain as much. The threshold is the same for all images: their quality grows
-about evenly with doublings, so by the mean slope of each one's curve (Satopää et al. 2011) all would get the
-same number.
+FEWEST_SHAPES, MOST_SHAPES = 64, 1024
+"""Range of the number of shapes: below it, more are nearly always worth their bytes; above it, a file is
+larger than many a JPEG of the same photograph.
 """
 
-EXACT_PSNR = 58.0
-"""PSNR at which an image of 8 bits a channel has no error but that of rounding [dB]."""
-
-ROUNDING_SHARE = 0.05
-"""Largest step to which a suggestion is rounded, as a share of it: it is no more exact than that."""
+VISIBLE_GAIN, GAIN_BYTES = 0.5, 10_000
+"""Least gain that can be seen [dB], a rule of thumb of image coding, and the most bytes that it may take."""
 
 SIMPLER = ", and --detail how small they may be"
 """Ending of a suggestion for a drawing."""
@@ -53,19 +40,14 @@ SIMPLER = ", and --detail how small they may be"
 @described
 @dataclass(frozen=True)
 class Expected:
-    """Expected quality and size of a number of shapes."""
+    """Quality and size of a draft; a run of the default effort gets a little more of the same size."""
 
     shapes: int
-    """Their number."""
+    """Number of shapes."""
     psnr: float
     """PSNR of the file as a viewer shows it [dB]."""
     bytes: int
     """Size of the file."""
-
-    def __str__(self) -> str:
-        """Return the beginning of a sentence."""
-        size = f"{self.bytes / 1000:.0f} kB" if self.bytes >= 10_000 else f"{self.bytes / 1000:.1f} kB"
-        return f"{counted(self.shapes, 'shape')} should give {self.psnr:.1f} dB in {size}"
 
 
 @described
@@ -80,11 +62,7 @@ class Suggestion:
     why: str
     """The reason, in sentences."""
     expected: tuple[Expected, ...]
-    """For the suggested number and others around it, ascending, by runs of the default effort."""
-    by_shapes: int | None
-    """Most shapes of which 100 more gain what can be seen."""
-    by_bytes: int | None
-    """Most shapes of which 10 kB more gain what can be seen."""
+    """Drafts with ascending numbers of shapes, each twice that of the one before."""
     seconds: float
     """Time that the search took."""
 
@@ -118,14 +96,13 @@ def suggest(
 ) -> Suggestion | None:
     """Suggest how many shapes an image is worth: as many as still gain what can be seen for their bytes.
 
-    A short fit on a reduced image, whose shapes grow from few to many, estimates the result of each number;
-    it takes a fraction of the time of a run.
+    Drafts are made with twice as many shapes each time, until that gains less than 0.5 dB for 10 kB.
 
     Arguments are those of ``vectorize``, without ``curves`` and goals.
 
     Returns:
-        the number, the reason, and the expected results of it and others at the default effort; None if the
-        run was stopped. Images that are traced have no number to choose, which the reason explains.
+        the number, the reason, and the drafts; None if the run was stopped. Images that are traced have no
+        number to choose, which the reason explains.
 
     Raises:
         UsageError: settings that decide the number of shapes.
@@ -143,68 +120,48 @@ def suggest(
                 f"A {SUBJECTS[subject]}{seen}, which is traced: the picture says how many shapes there are"
                 f"{SIMPLER if subject == 'drawing' else ''}. --subject photo fits a number of shapes to it."
             )
-            return Suggestion(None, subject, why, (), None, None, time.monotonic() - run.started)
-        worth = survey(prepared.problem, run)
+            return Suggestion(None, subject, why, (), time.monotonic() - run.started)
+        drafts = make_drafts(prepared.problem, run)
     if run.failures:
         raise run.failures[0]
-    if worth is None:
+    if drafts is None:
         return None
-    made = suggestion(worth)
+    curves, why = choose(drafts)
     guess = guess_subject(prepared.problem.target)
-    rough = f" It looks like a {SUBJECTS[guess.subject]} ({guess.why}), of which this is a rough guess."
-    why = made.why if guess.subject == "photo" else made.why + rough
-    return replace(made, why=why, seconds=time.monotonic() - run.started)
+    if guess.subject != "photo":
+        why += f" It looks like a {SUBJECTS[guess.subject]} ({guess.why}), of which this is a rough guess."
+    return Suggestion(curves, "photo", why, drafts, time.monotonic() - run.started)
 
 
-def suggestion(worth: Worth) -> Suggestion:
-    """Return the suggestion: the smaller of the numbers that shapes and bytes allow."""
-    by_shapes, by_bytes = most_worth(worth, MORE_SHAPES), most_worth(worth, MORE_BYTES / worth.bytes_each)
-    chosen = min(by_shapes, by_bytes)
-    why = reason(worth, chosen, "100 more" if by_shapes <= by_bytes else "10 kB more")
-    rows = sorted({min(max(round(share * chosen), worth.fewest), worth.most) for share in ROW_RATIOS})
-    expected = tuple(expect(worth, row) for row in rows)
-    return Suggestion(chosen, "photo", why, expected, by_shapes, by_bytes, 0.0)
+def make_drafts(problem: Problem, run: Run) -> tuple[Expected, ...] | None:
+    """Return drafts of ascending numbers of shapes until one is not worth its bytes; None if stopped."""
+    most = min(MOST_SHAPES, simple_curves(problem.target))
+    shapes, drafts, settings = min(FEWEST_SHAPES, most), list[Expected](), draft_of(problem.settings)
+    parts = run.open_parts()
+    while shapes <= most and (len(drafts) < 2 or is_worth(*drafts[-2:])):
+        draft = replace(problem, settings=replace(settings, curves=shapes, simplify=False))
+        made = fit(draft, next(parts))
+        if made.interrupted:
+            return None
+        candidate = measured(draft, made)
+        drafts.append(Expected(shapes, round(candidate.psnr, 2), candidate.size))
+        shapes *= 2
+    return tuple(drafts)
 
 
-def most_worth(worth: Worth, more: float) -> int:
-    """Return the most shapes at which ``more`` of them gain ``VISIBLE_GAIN``; the fewest if none do."""
-    low, high = elementary.log([worth.fewest, worth.most])
-    shapes = elementary.exp(np.linspace(low, high, GAIN_SAMPLES))
-    shapes[[0, -1]] = worth.fewest, worth.most
-    if worth.fewest == worth.most:
-        return worth.most
-    rate = np.gradient(np.minimum(worth.psnr(shapes), EXACT_PSNR), shapes)
-    at = np.flatnonzero(more * rate >= VISIBLE_GAIN)
-    return min(rounded(float(shapes[at[-1]])), worth.most) if len(at) else worth.fewest
+def is_worth(one: Expected, two: Expected) -> bool:
+    """Tell whether the second draft gains what can be seen for its additional bytes."""
+    return (two.psnr - one.psnr) * GAIN_BYTES > VISIBLE_GAIN * (two.bytes - one.bytes)
 
 
-def expect(worth: Worth, shapes: int) -> Expected:
-    """Return the expected quality and size of ``shapes``."""
-    return Expected(shapes, round(float(worth.psnr(shapes)), 2), round(float(worth.size(shapes))))
-
-
-def reason(worth: Worth, chosen: int, more: str) -> str:
-    """Return the reason for a number, from which on ``more`` gains less."""
-    if worth.fewest == worth.most:
-        return f"The picture is so small that there is no room for more than {counted(worth.most, 'shape')}."
-    one, two = expect(worth, chosen), expect(worth, 2 * chosen)
-    if one.psnr > EXACT_PSNR:
-        return f"{one}; more are expected to add nothing that can be seen."
-    first = str(one)
-    if 2 * chosen <= worth.most:
-        size = (two.bytes - one.bytes) / 1000
-        first += f", and twice as many {two.psnr - one.psnr:.1f} dB more for {size:.0f} kB more"
-    seen = f"{more} buy {VISIBLE_GAIN} dB at least, which can be seen"
-    if chosen >= worth.most:
-        return f"{first}. All the way to {worth.most:,} shapes {seen}."
-    if chosen == worth.fewest:
-        return f"{first}. From there on {more} buy less than {VISIBLE_GAIN} dB, which can hardly be seen."
-    return f"{first}. Up to there {seen}, beyond it less."
-
-
-def rounded(number: float) -> int:
-    """Return a round number near another one."""
-    most = max(ROUNDING_SHARE * number, 1.0)
-    unit = elementary.power_of_ten(len(str(int(most))) - 1)
-    step = max(unit * factor for factor in (1, 2, 5) if unit * factor <= most)
-    return max(1, round(step * round(number / step)))
+def choose(drafts: Sequence[Expected]) -> tuple[int, str]:
+    """Return the number of shapes of the last draft that is worth its bytes, and the reason."""
+    if len(drafts) == 1:
+        shapes = counted(drafts[0].shapes, "shape")
+        return drafts[0].shapes, f"The picture is so small that there is no room for more than {shapes}."
+    rule = f"{VISIBLE_GAIN} dB, about the least that can be seen, for each {GAIN_BYTES // 1000} kB"
+    one, two = drafts[-2:]
+    if is_worth(one, two):
+        return two.shapes, f"Up to {two.shapes:,} shapes, twice as many always buy at least {rule}."
+    gain, size = two.psnr - one.psnr, (two.bytes - one.bytes) / 1000
+    return one.shapes, f"Twice as many buy {gain:.1f} dB for {size:.0f} kB more: less than {rule}."

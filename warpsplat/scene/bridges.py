@@ -18,6 +18,7 @@ from warpsplat.scene.simple import (
     free_fills,
     merged,
     polygon,
+    polygon_ring,
     rings_of,
     with_rings,
 )
@@ -76,8 +77,4 @@ def _rectangle(start: Floats, end: Floats, width: float) -> Floats:
     along = (end - start) / max(float(elementary.hypot(*(end - start))), 1e-9)
     across = 0.5 * width * np.array([-along[1], along[0]])
     start, end = start - 0.5 * width * along, end + 0.5 * width * along
-    corners = np.round([start - across, end - across, end + across, start + across])
-    following = np.roll(corners, -1, axis=0)
-    return np.stack(
-        [corners, (2 * corners + following) / 3, (corners + 2 * following) / 3, following], axis=1
-    )
+    return polygon_ring(np.round([start - across, end - across, end + across, start + across]))

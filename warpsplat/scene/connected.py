@@ -15,7 +15,7 @@ from warpsplat.scene.simple import (
     merged,
     polygon,
     rings_of,
-    turns,
+    windings,
     with_rings,
 )
 
@@ -49,7 +49,9 @@ def parts_of(rings: list[Floats]) -> list[list[Floats]]:
     parts = {i: [rings[i]] for i in outer}
     for hole in sorted(set(range(len(rings))) - set(outer)):
         # A hole may touch what is around it, in a point.
-        around = [i for i in outer if 2 * int((turns(lines[i], lines[hole]) > 0).sum()) > len(lines[hole])]
+        around = [
+            i for i in outer if 2 * int((windings([lines[i]], lines[hole]) > 0).sum()) > len(lines[hole])
+        ]
         if around:
             parts[min(around, key=areas.__getitem__)].append(rings[hole])
     return list(parts.values())

@@ -18,10 +18,13 @@ from warpsplat.scene.simple import (
     joined,
     merged,
     moved_left,
+    polygon_ring,
     reversed_ring,
     rings_of,
     with_rings,
 )
+
+CORNERS = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float64)
 
 
 def cut_out(scene: Scene, per_pixel: float) -> Scene:
@@ -35,7 +38,7 @@ def cut_out(scene: Scene, per_pixel: float) -> Scene:
     least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
     above: list[Floats] = []
     size = per_pixel * np.array([scene.canvas.width, scene.canvas.height])
-    page = [_rectangle(*size.tolist())]
+    page = [polygon_ring(size * CORNERS)]
     is_solid = (scene.paint == Paint.FLAT) & (scene.opacities >= 1)
     of_color: dict[bytes, int] = {}
     for shape in reversed(free_fills(scene)):
@@ -96,19 +99,13 @@ def _with_background(scene: Scene) -> Scene:
     if canvas.background is None:
         return scene
     bare = replace(canvas, background=None)
-    points = _rectangle(canvas.width, canvas.height)[:, :3].reshape(1, -1, 2).astype(np.float32)
+    size = np.array([canvas.width, canvas.height], np.float64)
+    points = polygon_ring(size * CORNERS)[:, :3].reshape(1, -1, 2).astype(np.float32)
     behind = Scene.uniform(Kind.FILL, bare, points, Basis.CUBIC)
     behind = replace(
         behind, colors=canvas.background[None].astype(np.float32), opacities=np.ones(1, np.float32)
     )
     return behind.append(replace(scene, canvas=bare))
-
-
-def _rectangle(width: float, height: float) -> Floats:
-    """Return a rectangle with a corner at 0 as a ring of cubics, shape (4, 4, 2)."""
-    corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], np.float64)
-    steps = np.roll(corners, -1, axis=0) - corners
-    return corners[:, None] + np.arange(4)[:, None] / 3 * steps[:, None]
 
 
 def _combined(

@@ -305,7 +305,7 @@ def bounding(rings: list[Floats], painted: Painted, kept: Sequence[Floats] = ())
     owner = np.repeat(np.arange(len(rings)), [len(own) for own in places])
     one = np.concatenate([line[own] for line, own in zip(chosen, places, strict=True)])
     other = np.concatenate([np.roll(line, -1, axis=0)[own] for line, own in zip(chosen, places, strict=True)])
-    around = _turns_of_others(lines, 0.5 * (one + other), owner)
+    around = windings(lines, 0.5 * (one + other), owner)
     is_clockwise = np.array([area(line) > 0 for line in chosen])
     inside = painted(around + np.where(is_clockwise[owner], 1, -1))
     length, outside = elementary.hypot(*(other - one).T), painted(around)
@@ -317,8 +317,11 @@ def bounding(rings: list[Floats], painted: Painted, kept: Sequence[Floats] = ())
     return [ring if runs_so[i] else reversed_ring(ring) for i, ring in enumerate(rings) if bounds[i]]
 
 
-def _turns_of_others(lines: list[Floats], points: Floats, owner: IndexArray) -> IndexArray:
-    """Return how often polygons but its owner wind around each point, positive from x towards y."""
+def windings(lines: list[Floats], points: Floats, owner: IndexArray | None = None) -> IndexArray:
+    """Return how often polygons wind around each point, positive from x towards y.
+
+    ``owner``: the polygon that each point is on, which does not count.
+    """
     one, other = np.concatenate(lines), np.concatenate([np.roll(line, -1, axis=0) for line in lines])
     ring = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
     low, high = np.minimum(one[:, 1], other[:, 1]), np.maximum(one[:, 1], other[:, 1])
@@ -333,8 +336,9 @@ def _turns_of_others(lines: list[Floats], points: Floats, owner: IndexArray) -> 
     begins = np.searchsorted(rows[order], np.arange(count + 1))
     counts = begins[at + 1] - begins[at]
     point, line = np.repeat(np.arange(len(points)), counts), line[order][ranges(begins[at], counts)]
-    others = ring[line] != owner[point]
-    point, line = point[others], line[others]
+    if owner is not None:
+        others = ring[line] != owner[point]
+        point, line = point[others], line[others]
     a, b = one[line] - points[point], other[line] - points[point]
     side = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
     up, down = (a[:, 1] <= 0) & (b[:, 1] > 0) & (side > 0), (a[:, 1] > 0) & (b[:, 1] <= 0) & (side < 0)
@@ -346,18 +350,16 @@ def polygon(ring: Floats) -> Floats:
     return flattened(ring, PIECES)[:, :-1].reshape(-1, 2)
 
 
+def polygon_ring(corners: Floats) -> Floats:
+    """Return a polygon as a ring of cubics: (point, 2) -> (cubic, 4, 2)."""
+    steps = np.roll(corners, -1, axis=0) - corners
+    return np.asarray(corners[:, None] + np.arange(4)[:, None] / 3 * steps[:, None])
+
+
 def area(ring: Floats) -> float:
     """Return the area inside a polygon [units²], negative if it runs from y towards x."""
     x, y = ring[:, 0], ring[:, 1]
     return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
-def turns(ring: Floats, points: Floats) -> IndexArray:
-    """Return how often a polygon winds around each of some points, positive from x towards y."""
-    one, other = ring - points[:, None], np.roll(ring, -1, axis=0) - points[:, None]
-    up, down = (one[..., 1] <= 0) & (other[..., 1] > 0), (one[..., 1] > 0) & (other[..., 1] <= 0)
-    side = one[..., 0] * other[..., 1] - other[..., 0] * one[..., 1]
-    return np.asarray((up & (side > 0)).sum(axis=1) - (down & (side < 0)).sum(axis=1), np.intp)
 
 
 def moved_left(ring: Floats, distance: float) -> Floats:

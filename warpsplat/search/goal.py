@@ -110,7 +110,7 @@ def search_goal(problem: Problem, run: Run) -> Fit:
 
 def _progress(settings: Settings) -> tuple[float, float]:
     """Return the likely shares of all steps that are done after the probe runs, and after the first fit."""
-    probes = LIKELY_PROBES * _draft(settings).iterations if settings.target_psnr else 0
+    probes = LIKELY_PROBES * draft_of(settings).iterations if settings.target_psnr else 0
     steps = probes + (1 + LIKELY_ROUNDS * LAST_STEPS) * settings.iterations
     return probes / steps, (probes + settings.iterations) / steps
 
@@ -131,7 +131,7 @@ def estimate_curves(problem: Problem, most: int, run: Run) -> tuple[int, int, Fi
     """Estimate by probe runs how many shapes the target takes; return also their steps, and the last one."""
     settings = problem.settings
     assert settings.target_psnr
-    draft = _draft(settings)
+    draft = draft_of(settings)
     longer = elementary.log(settings.iterations / draft.iterations) / elementary.log(5)
     aim = settings.target_psnr - PROBE_GAIN * float(longer)
     curves, done = min(PROBE_CURVES, most), 0
@@ -148,8 +148,8 @@ def estimate_curves(problem: Problem, most: int, run: Run) -> tuple[int, int, Fi
     return curves, done, made
 
 
-def _draft(settings: Settings) -> Settings:
-    """Return the settings of probe runs."""
+def draft_of(settings: Settings) -> Settings:
+    """Return the settings of a draft, which has no goals."""
     draft = PRESETS["draft"]
     names = ("coarse_pixels", "fine_pixels", "iterations")
     least = {name: min(draft[name], getattr(settings, name)) for name in names}

@@ -34,7 +34,6 @@ EXTRAS = {
     "pdf": ("typst", "outputs that end in .pdf"),
     "dxf": ("ezdxf", "outputs that end in .dxf"),
     "video": ("av", "animations that end in .mp4"),
-    "compare": ("vtracer", "warpsplat compare"),
     "ray": ("ray", "warpsplat batch --executor ray"),
     "serve": ("starlette", "warpsplat serve"),
     "remote": ("upath", "images and results behind URLs"),

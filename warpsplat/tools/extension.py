@@ -6,7 +6,6 @@ FOLDER = "warpsplat.tools.commands"
 
 EXTENSION = Extension(
     commands={
-        "compare": Command("Compare our files with another program's.", f"{FOLDER}.compare:command"),
         "bench": Command("Time the stages of a training step.", f"{FOLDER}.bench:command"),
         "info": Command("Show version and devices.", f"{FOLDER}.doctor:info"),
         "doctor": Command("Check that everything a run needs works.", f"{FOLDER}.doctor:command"),

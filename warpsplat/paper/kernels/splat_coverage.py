@@ -21,7 +21,6 @@ from warpsplat.paper import constants as paper
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-STEEP = wp.constant(1.0e9)  # makes a step of a clamped difference
 EXPONENT = wp.constant(-0.5 / 256.0)
 
 
@@ -44,7 +43,7 @@ def gaussian_column(con: wp.vec3, dx: wp.float32, dy: Any, c_dy: Any, least: Any
     """
     one = type(dy)(1.0)
     v = wp.cw_mul(dy, c_dy + type(dy)(2.0 * con[1] * dx)) + type(dy)(con[0] * dx * dx)
-    within = wp.min(wp.max(STEEP * (v - least), type(dy)(0.0)), one)
+    within = wp.min(wp.max(constants.STEEP * (v - least), type(dy)(0.0)), one)
     e = one + wp.max(v, least)
     e = 0.5 * (wp.cw_mul(e, e) + one)
     e = wp.cw_mul(e, e)
@@ -232,7 +231,7 @@ def make_backward(column: Any, *, soft: bool) -> wp.Kernel:
                         if soft:
                             p = wp.cw_div(wp.cw_mul(p, g), one - peak * g)
                         else:
-                            below = wp.min(wp.max(STEEP * (most - g), zero), one)
+                            below = wp.min(wp.max(constants.STEEP * (most - g), zero), one)
                             p = wp.cw_div(wp.cw_mul(p, wp.cw_mul(below, g)), one - wp.min(g, most))
                         moment0 = moment0 + p
                         moment1 = moment1 + dx * p

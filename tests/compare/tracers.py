@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from warpsplat.tools.tracer import Tracer, TracerOptions
+from warpsplat.compare.tracer import Tracer, TracerOptions
 
 SIZES: dict[str, TracerOptions] = {"one": {"bands": 1}, "four": {"bands": 4}}
 

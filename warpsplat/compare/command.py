@@ -11,18 +11,18 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.options import INPUT, flag, overwrite_option, run_options
+from warpsplat.compare.tracer import TRACERS
 from warpsplat.errors import Stopped, UsageError, printable, shown
 from warpsplat.run.options import BY_NAME, settings_from
-from warpsplat.tools.tracer import TRACERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from warpsplat.compare.comparison import Comparison, ComparisonRow
+    from warpsplat.compare.tracer import Tracer
     from warpsplat.fit.settings import Settings
     from warpsplat.run.result import Result
     from warpsplat.scene import FloatArray
-    from warpsplat.tools.compare import Comparison, ComparisonRow
-    from warpsplat.tools.tracer import Tracer
 
 TABLES, FIGURES = "comparison.md", "comparison.json"
 """Files in the folder besides the SVGs."""
@@ -53,8 +53,8 @@ def prepare_folder(
     Raises:
         UsageError: they cannot, or exist and ``overwrite`` is not given.
     """
+    from warpsplat.compare.comparison import OURS
     from warpsplat.files.output import check_output
-    from warpsplat.tools.compare import OURS
 
     made = [(OURS, str(ours.curves)) for ours in settings]
     made += [(tracer.name, setting) for setting in tracer.settings]
@@ -128,7 +128,7 @@ def command(
     nodes; and the time they took. Both get the same pixels, with
     transparency on white.
 
-    VTracer must be installed: the extra "compare".
+    VTracer must be installed.
     """
     settings = [settings_from({**given, "curves": n}) for n in parse_curves(curves)]
     tracer = TRACERS[against]()
@@ -137,6 +137,7 @@ def command(
         prepare_folder(output, images, settings, tracer, overwrite=overwrite)
     from warpsplat.cli.run import progress_bar
     from warpsplat.cli.signals import Interrupt
+    from warpsplat.compare.comparison import Comparison, compare, warm_up
     from warpsplat.files.output import write_result
     from warpsplat.files.sources import image_of
     from warpsplat.fit.problem import Problem, Run
@@ -144,7 +145,6 @@ def command(
     from warpsplat.rendering.device import choose_device, start_warp
     from warpsplat.run.prepare import PreparedImage, choose_subject
     from warpsplat.run.vectorize import make_result
-    from warpsplat.tools.compare import Comparison, compare, warm_up
 
     start_warp()
     backend = Backend.on(choose_device(device), threads)
@@ -176,8 +176,8 @@ def command(
 
 def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: bool) -> None:
     """Write tables and figures into the folder, and print one of them."""
+    from warpsplat.compare.tables import markdown
     from warpsplat.files.output import write_result
-    from warpsplat.tools.compare_tables import markdown
 
     tables, figures = markdown(found), json.dumps(found.as_dict())
     if output:

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from tests.cli.helpers import one_line, run
-from tests.tracers import bands, stub
-from warpsplat.tools.tracer import TRACERS, TracerOptions
+from tests.compare.tracers import bands, stub
+from warpsplat.compare.tracer import TRACERS, TracerOptions
 
 QUICK = ["--against", "vtracer", "--curves", "8,4", "--iterations", "12", "--device", "cpu"]
 REPORTS = {"comparison.md", "comparison.json"}

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.compare.tracers import SIZES, bands, stub
 from tests.fit.pictures import picture
 from tests.runs import vectorize
-from tests.tracers import SIZES, bands, stub
+from warpsplat.compare.comparison import OURS, compare, warm_up
+from warpsplat.compare.tracer import VTRACER_SETTINGS, TracerOptions, vtracer
 from warpsplat.files.sources import image_of
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, make_settings
@@ -23,8 +25,6 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
-from warpsplat.tools.compare import OURS, compare, warm_up
-from warpsplat.tools.tracer import VTRACER_SETTINGS, TracerOptions, vtracer
 
 
 def run(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
@@ -102,7 +102,7 @@ def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None
     def note(image: PreparedImage, run: Run) -> None:
         made.append(image.problem.settings)
 
-    monkeypatch.setattr("warpsplat.tools.compare.make_result", note)
+    monkeypatch.setattr("warpsplat.compare.comparison.make_result", note)
     asked = make_settings(curves=100_000, iterations=1_000_000, renderer="splat")
     warm_up(asked, Backend.on("cpu"))
     assert (made[0].kind, made[0].renderer) == (asked.kind, asked.renderer)

@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 
 from warpsplat._version import __version__
+from warpsplat.compare.tracer import Tracer
 from warpsplat.errors import ImageError, Stopped, printable
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
@@ -22,7 +23,6 @@ from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
 from warpsplat.run.vectorize import make_result
 from warpsplat.scene import FloatArray
-from warpsplat.tools.tracer import Tracer
 
 OURS = "warpsplat"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from tests.tracers import stub
+from tests.compare.tracers import stub
+from warpsplat.compare.comparison import OURS, Comparison, ComparisonRow
+from warpsplat.compare.tables import markdown, means, table
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import Score
-from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
-from warpsplat.tools.compare_tables import markdown, means, table
 
 SCORE = Score(28.125, 0.75, ms_ssim=0.9, ssimulacra2=None, paths=8, nodes=96, bytes=1234, gzip_bytes=640)
 

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from statistics import fmean
 
 from warpsplat._version import __version__
+from warpsplat.compare.comparison import OURS, Comparison, ComparisonRow
 from warpsplat.errors import counted
-from warpsplat.tools.compare import OURS, Comparison, ComparisonRow
 
 Figures = dict[str, float | None]
 """Figures of a row, or means; None if unknown."""

@@ -51,8 +51,7 @@ def vtracer() -> Tracer:
     try:
         import vtracer as package
     except ImportError as error:
-        hint = "pip install vtracer, or warpsplat with its extra: '.[compare]'"
-        raise UsageError(f"compare needs vtracer, which is not installed: {hint}") from error
+        raise UsageError("compare needs vtracer, which is not installed: pip install vtracer") from error
 
     def trace(png: bytes, options: TracerOptions) -> str:
         with messages_hidden():  # a Rust panic prints a trace

@@ -1,0 +1,1 @@
+"""Comparison with other programs, for developers: in the repository only, no part of the wheel."""
