@@ -13,6 +13,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.portable import elementary
+from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.scene import Basis, FloatArray, Kind
 
 TIMED_STEPS = 4
@@ -38,16 +39,29 @@ SHRINKAGE = 0.92
 
 
 class Budget:
-    """A deadline (``time.monotonic``), and the time of a step in each phase."""
+    """A deadline (``time.monotonic``; infinite: none), and the time of a step in each phase."""
 
     def __init__(self, deadline: float) -> None:
         self.deadline = deadline
         self.costs: list[float] = []
-        """Time of a step in each phase [s]."""
+        """Time of a step in each phase [s]; without a deadline none is measured."""
+        self.ended: int | None = None
+        """Steps that were done when the time was up, and the last ones were planned."""
+        self._began, self._compiled = time.monotonic(), compile_seconds()
+
+    @property
+    def adapts(self) -> bool:
+        """Whether the number of steps follows the time left."""
+        return bool(self.costs) and self.ended is None
 
     def over(self) -> bool:
-        """Return whether the time is up."""
-        return time.monotonic() > self.deadline
+        """Return whether the time is up, and the last steps are not planned yet."""
+        return self.adapts and time.monotonic() > self.deadline
+
+    def share(self) -> float:
+        """Return the share of the time that is spent, at most 1."""
+        spent = time.monotonic() - self._began
+        return min(spent / max(self.deadline - self._began, 1e-9), 1.0)
 
     def measure(
         self, state: FitState, settings: Settings, image: FloatArray, loss: CustomLoss | None = None
@@ -58,9 +72,31 @@ class Budget:
             begin = time.monotonic()
             step.time(TIMED_STEPS)
             self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)
-        return self.fit(settings, 0, 1.0)
+        self._began, self._compiled = time.monotonic(), compile_seconds()
+        return self._fit(settings, 0, 1.0)
 
-    def fit(self, settings: Settings, done: int, slowness: float) -> Settings:
+    def fit(self, step: Step) -> None:
+        """Continue with as many steps as end by the deadline, after some at the coarse size."""
+        worked = time.monotonic() - self._began - (compile_seconds() - self._compiled)
+        done = step.state.step
+        step.configure(self._fit(step.settings, done, worked / (done * self.costs[0])))
+
+    def end(self, step: Step, least: int, *, missing: bool, is_fine: bool) -> None:
+        """Plan the last steps, at the present size.
+
+        Args:
+            step: of the fit.
+            least: steps of the schedule that are made in any case.
+            missing: whether shapes are missing, which are placed now and need some steps.
+            is_fine: whether the present size is the finest one.
+        """
+        settings, done = step.settings, step.state.step
+        self.ended = done
+        last = max(done + (CHECK_INTERVAL if missing else 1), least)
+        coarse = settings.coarse if is_fine else 1.0
+        step.configure(replace(settings, iterations=min(last, settings.iterations), coarse=coarse))
+
+    def _fit(self, settings: Settings, done: int, slowness: float) -> Settings:
         """Return ``settings`` with as many steps as end by the deadline, after ``done`` steps.
 
         ``slowness``: actual time of a step over the one measured.

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from warpsplat.alpha import squares
 from warpsplat.fit.export import export
-from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.problem import Problem, Run, Start
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.rounding import USUAL_GRID, finest
 from warpsplat.fit.schedule import Phase, phases
