@@ -44,19 +44,12 @@ class Budget:
     def __init__(self, deadline: float) -> None:
         self.deadline = deadline
         self.costs: list[float] = []
-        """Time of a step in each phase [s]; without a deadline none is measured."""
-        self.ended: int | None = None
-        """Steps that were done when the time was up, and the last ones were planned."""
+        """Time of a step in each phase [s]; none without a deadline, and once the last steps are planned."""
         self._began, self._compiled = time.monotonic(), compile_seconds()
-
-    @property
-    def adapts(self) -> bool:
-        """Whether the number of steps follows the time left."""
-        return bool(self.costs) and self.ended is None
 
     def over(self) -> bool:
         """Return whether the time is up, and the last steps are not planned yet."""
-        return self.adapts and time.monotonic() > self.deadline
+        return bool(self.costs) and time.monotonic() > self.deadline
 
     def share(self) -> float:
         """Return the share of the time that is spent, at most 1."""
@@ -80,21 +73,6 @@ class Budget:
         worked = time.monotonic() - self._began - (compile_seconds() - self._compiled)
         done = step.state.step
         step.configure(self._fit(step.settings, done, worked / (done * self.costs[0])))
-
-    def end(self, step: Step, least: int, *, missing: bool, is_fine: bool) -> None:
-        """Plan the last steps, at the present size.
-
-        Args:
-            step: of the fit.
-            least: steps of the schedule that are made in any case.
-            missing: whether shapes are missing, which are placed now and need some steps.
-            is_fine: whether the present size is the finest one.
-        """
-        settings, done = step.settings, step.state.step
-        self.ended = done
-        last = max(done + (CHECK_INTERVAL if missing else 1), least)
-        coarse = settings.coarse if is_fine else 1.0
-        step.configure(replace(settings, iterations=min(last, settings.iterations), coarse=coarse))
 
     def _fit(self, settings: Settings, done: int, slowness: float) -> Settings:
         """Return ``settings`` with as many steps as end by the deadline, after ``done`` steps.

@@ -97,8 +97,8 @@ def stage_is_due(fit: Training) -> bool:
 
 def opacities_are_due(fit: Training) -> bool:
     """Return whether opacities are to be rounded."""
-    late = fit.done >= opacities_at(fit.settings)
-    return fit.rounds and renderer_of(fit.settings.renderer).exact and late and not fit.state.opacities_frozen
+    late = fit.done >= opacities_at(fit.settings) and not fit.step.state.opacities_frozen
+    return fit.rounds and late and renderer_of(fit.settings.renderer).exact
 
 
 def file_is_due(fit: Training) -> bool:
@@ -107,22 +107,21 @@ def file_is_due(fit: Training) -> bool:
     A viewer may show kept elements differently from the start: they blend with what lies below.
     """
     blends = bool(fit.start.scene and fit.start.scene.pictures)
-    wanted = fit.settings.viewer and fit.rounds and fit.state.grid is None
-    late = blends or not fit.is_before(EVALUATE_FROM)
+    wanted = fit.settings.viewer and fit.rounds and fit.step.state.grid is None
+    late = blends or fit.done >= EVALUATE_FROM * fit.settings.iterations
     return wanted and fit.is_fine and late and fit.done % EVALUATE_INTERVAL == 0
 
 
 def interval_is_due(fit: Training) -> bool:
-    """Return whether shapes may change now: every few steps, and when the time is up and some are missing."""
+    """Return whether shapes may change now."""
     interval = fit.settings.density.interval
-    regular = interval > 0 and fit.done % interval == 0
-    return regular or (fit.budget.ended == fit.done and fit.missing > 0)
+    return interval > 0 and fit.done % interval == 0
 
 
 def time_is_due(fit: Training) -> bool:
     """Return whether the number of steps is adapted: at the fine size the schedule stays as it is."""
-    coarse = fit.step.target.phase is fit.plan[0]
-    return fit.budget.adapts and coarse and interval_is_due(fit) and fit.densifies
+    adapts = bool(fit.budget.costs) and fit.step.target.phase is fit.plan[0]
+    return adapts and interval_is_due(fit) and fit.densifies
 
 
 def bytes_are_due(fit: Training) -> bool:
@@ -138,7 +137,7 @@ def densification_is_due(fit: Training) -> bool:
 
 def reading_is_due(fit: Training) -> bool:
     """Return whether the shapes are to be read back, unless another event just did."""
-    known = fit.state.known
+    known = fit.step.state.known
     return fit.done % EVALUATE_INTERVAL == 0 and not (known and known[0] == fit.done)
 
 
@@ -150,7 +149,7 @@ def target_is_due(fit: Training) -> bool:
 
 def colors_are_due(fit: Training) -> bool:
     """Return whether shapes choose colours of the palette; while points are rounded, they keep theirs."""
-    return fit.palette is not None and fit.state.grid is None and fit.palette.is_due(fit.state)
+    return fit.palette is not None and fit.step.state.grid is None and fit.palette.is_due(fit.step.state)
 
 
 def check_is_due(fit: Training) -> bool:
@@ -164,20 +163,14 @@ def recovery_is_due(fit: Training) -> bool:
 
 
 BEFORE_A_STEP = (
-    Event(
-        "plan the last steps",
-        lambda fit: fit.budget.over(),
-        lambda fit: fit.budget.end(
-            fit.step, fit.start.begin + CHECK_INTERVAL, missing=fit.missing > 0, is_fine=fit.is_fine
-        ),
-    ),
+    Event("plan the last steps", lambda fit: fit.budget.over(), lambda fit: fit.plan_last_steps()),
     Event("round points", stage_is_due, lambda fit: round_stage(fit.step, fit.rounding)),
     Event("freeze opacities", opacities_are_due, lambda fit: freeze_opacities(fit.step)),
     Event("evaluate the file", file_is_due, lambda fit: evaluate_file(fit.step)),
     Event("adapt the number of steps", time_is_due, lambda fit: fit.budget.fit(fit.step)),
     Event("adapt the number of shapes", bytes_are_due, lambda fit: fit.step.configure(affordable(fit.step))),
     Event("densify", densification_is_due, lambda fit: densify(fit.step, grows=fit.grows)),
-    Event("read the shapes back", reading_is_due, lambda fit: fit.state.scene()),
+    Event("read the shapes back", reading_is_due, lambda fit: fit.step.state.scene()),
     Event("change the target", target_is_due, lambda fit: fit.step.aim(fit.target(fit.settings, fit.done))),
     Event("choose colours", colors_are_due, lambda fit: fit.choose_colors()),
 )

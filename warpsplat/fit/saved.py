@@ -33,16 +33,10 @@ MOST_RENEWED = 1 << 40
 TARGETS = 10.0
 """Largest value of the target: the image, less the viewer's difference from the render."""
 
-FIGURES = {
-    "per_pixel": float,
-    "render_psnr": float,
-    "estimated_psnr": float,
-    "iterations": int,
-    "renewed": int,
-}
+SAVED = {"per_pixel": float, "render_psnr": float, "estimated_psnr": float, "iterations": int, "renewed": int}
 """Fields of a ``Fit`` that are saved beside its scene."""
 
-MOST_FIGURE = 1e9
+SAVED_LIMIT = 1e9
 """Largest of them."""
 
 
@@ -94,6 +88,7 @@ def step_from(
     rng.bit_generator.state = numbers["generator"]
     clock = backend.array(wp.int32, 1)
     clock.fill_(done)
+    grid = number(numbers, "per_pixel", float, 1e-3, FINEST)
     state = FitState(
         parameters,
         clock,
@@ -101,7 +96,7 @@ def step_from(
         done,
         base,
         opacities_frozen=number(numbers, "settled", bool),
-        grid=number(numbers, "per_pixel", float, 1e-3, FINEST) if number(numbers, "rounding", bool) else None,
+        grid=grid if number(numbers, "rounding", bool) else None,
         renewed=number(numbers, "renewed", int, 0, MOST_RENEWED),
         colored=parameters.revision if number(numbers, "colored", bool) else -1,
     )
@@ -120,13 +115,13 @@ def step_from(
 
 def fit_content(made: Fit) -> Content:
     """Return the result of a fit."""
-    return Content({name: kind(getattr(made, name)) for name, kind in FIGURES.items()}, to_arrays(made.scene))
+    return Content({name: kind(getattr(made, name)) for name, kind in SAVED.items()}, to_arrays(made.scene))
 
 
 def fit_from(content: Content, start: Scene) -> Fit:
     """Return the result of a fit that began with ``start``, from what ``fit_content`` returned."""
-    numbers, most = content.numbers, MOST_FIGURE
-    figures = {name: number(numbers, name, kind, -most, most) for name, kind in FIGURES.items()}
+    numbers, most = content.numbers, SAVED_LIMIT
+    figures = {name: number(numbers, name, kind, -most, most) for name, kind in SAVED.items()}
     return Fit(from_arrays(content.arrays, start), interrupted=False, **figures)
 
 

@@ -19,7 +19,7 @@ from warpsplat.fit.problem import USUAL_ROUNDING, Fit, Problem, Rounding, Run, S
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.rounding import choose_grid
 from warpsplat.fit.saved import step_from
-from warpsplat.fit.schedule import phase_at, phases, shapes_at, work_done
+from warpsplat.fit.schedule import CHECK_INTERVAL, phase_at, phases, shapes_at, work_done
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -99,11 +99,6 @@ class Training:
         return self.loss if counts else None
 
     @property
-    def state(self) -> FitState:
-        """How far the fit is."""
-        return self.step.state
-
-    @property
     def settings(self) -> Settings:
         """The settings that were given, as they are adapted by now."""
         return self.step.settings
@@ -126,21 +121,27 @@ class Training:
     @property
     def missing(self) -> int:
         """Number of shapes that are missing from those of the file; a surplus is negative."""
-        return self.base + self.settings.curves - self.state.parameters.shape_count if self.grows else 0
+        return self.base + self.settings.curves - self.step.state.parameters.shape_count if self.grows else 0
 
     def choose_colors(self) -> None:
         """Give each shape a colour of the palette, if there is one."""
         if self.palette:
             self.palette.choose(self.step)
 
-    def is_before(self, share: float) -> bool:
-        """Return whether less than a share of the steps is done."""
-        return self.done < share * self.settings.iterations
-
     @property
     def densifies(self) -> bool:
         """Whether densification is not over yet."""
-        return self.is_before(self.settings.density.stop)
+        return self.done < self.settings.density.stop * self.settings.iterations
+
+    def plan_last_steps(self) -> None:
+        """Plan the last steps, at the present size, and place shapes that are missing at once."""
+        settings, missing = self.settings, self.missing > 0
+        last = max(self.done + (CHECK_INTERVAL if missing else 1), self.start.begin + CHECK_INTERVAL)
+        coarse = settings.coarse if self.is_fine else 1.0
+        self.step.configure(replace(settings, iterations=min(last, settings.iterations), coarse=coarse))
+        self.budget.costs.clear()
+        if missing:
+            densify(self.step, grows=True)
 
     def progress(self) -> Progress:
         """Return the state of the fit, for people."""
@@ -152,13 +153,13 @@ class Training:
             seconds=time.monotonic() - self.run.started,
             work=budget.share() if budget.costs else work_done(settings, self.plan, self.done, begin),
             fine=self.is_fine,
-            shapes=self.state.shape_count,
+            shapes=self.step.state.shape_count,
             snapshot=self.step.snapshot(),
         )
 
     def result(self, *, interrupted: bool) -> Fit:
         """Return the shapes as they are now."""
-        step, state = self.step, self.state
+        step, state = self.step, self.step.state
         recover(step, replaces=False, last=True)
         if self.missing < 0:  # stopped before the surplus was pruned
             remove_surplus(step, self.base + self.settings.curves)
