@@ -63,7 +63,7 @@ def fit(
 def train(training: Training) -> Fit:
     """Make the steps of a fit, and return its result.
 
-    Everything else is an event, but for a look at whether to stop, and a checkpoint.
+    All else that happens is an event, except for checkpoints and the question whether to stop.
     """
     run, checkpoint = training.run, training.run.checkpoint
     training.begin()
@@ -174,6 +174,7 @@ BEFORE_A_STEP = (
     Event("change the target", target_is_due, lambda fit: fit.step.aim(fit.target(fit.settings, fit.done))),
     Event("choose colours", colors_are_due, lambda fit: fit.choose_colors()),
 )
+"""In their order: an event sees what those before it did."""
 
 AFTER_A_STEP = (
     Event(

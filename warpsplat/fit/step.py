@@ -91,7 +91,7 @@ class Step:
     def aim(self, target: Target) -> None:
         """Continue with another target: at another size, or with another loss.
 
-        A loss of another slope would need other moments of Adam: they are scaled.
+        Adam's moments are scaled by how much steeper another loss is.
         """
         before = None if target.loss is self.target.loss else self.slope()
         self._aim(target)
