@@ -19,7 +19,7 @@ from PIL import Image
 from tests.runs import vectorize
 from tests.tracing.copies import Copies, Ledger, counting
 from tests.tracing.trace import Count, Memory, Tracer, tracing
-from warpsplat.fit import densification, loop
+from warpsplat.fit import densification, loop, rounding
 from warpsplat.fit.objective import Quadratic
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
@@ -52,9 +52,10 @@ SIZES = ((512, 768, 512), (2048, 2040, 1344))
 KINDS = ("closed", "open")
 
 WATCHED = (
-    *((loop, name) for name in ("densify", "recover", "evaluate_file", "choose_grid", "freeze_stage")),
+    *((loop, name) for name in ("densify", "recover", "evaluate_file")),
+    *((rounding, name) for name in ("choose_grid", "freeze_stage")),
     *((densification, name) for name in ("new_shapes", "duplicates", "_reduce_points", "replace_shapes")),
-    (Step, "rebuilt"),
+    (Step, "rebuild"),
     (Quadratic, "removal_costs"),
 )
 """Functions whose time on the host is measured."""

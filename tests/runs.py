@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from warpsplat.fit.loop import Start
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.problem import Problem, Run, Start
 from warpsplat.fit.progress import Callback
 from warpsplat.fit.settings import Settings
 from warpsplat.metrics import Score

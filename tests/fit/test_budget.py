@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from tests.fit.pictures import picture
-from warpsplat.fit import loop
+from warpsplat.fit import budget
 from warpsplat.fit.budget import BUDGET_MARGIN
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Fit, Problem, Run
@@ -77,6 +77,6 @@ def test_time_that_is_lost_between_costs_steps_and_no_shapes(
 def test_compiling_does_not_make_steps_slow(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The time is gone, but the steps after it take no longer than those before."""
     clock = Clock(60.0)
-    monkeypatch.setattr(loop, "compile_seconds", lambda: clock.jumped)
+    monkeypatch.setattr(budget, "compile_seconds", lambda: clock.jumped)
     made = fitted(monkeypatch, device, 180.0, clock)
     assert 100 < made.iterations < 120

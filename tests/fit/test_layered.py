@@ -11,7 +11,7 @@ import pytest
 from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from tests.scenes import mixed_scene
-from warpsplat.fit.loop import Start
+from warpsplat.fit.problem import Start
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import make_settings

@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from warpsplat.fit.loop import work_done
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, TimeLeft
-from warpsplat.fit.schedule import phases
+from warpsplat.fit.schedule import phases, work_done
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 

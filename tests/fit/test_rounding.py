@@ -69,7 +69,7 @@ def test_a_stage_rounds_and_freezes_its_share(device: str, stage: int) -> None:
     """The points 0, 3, 6 ... of each shape, then those after them, then those before; all widths at once."""
     step = step_of(mixed_scene(64, 48), device)
     state = step.state
-    state.per_pixel = 2.0
+    state.grid = 2.0
     before = state.scene()
     low = rounded(before, 2.0)
     freeze_stage(step, stage)

@@ -51,7 +51,9 @@ def test_densification_splits_and_keeps_the_number(device: str) -> None:
     settings = replace(settings, density=replace(settings.density, start=1, surplus=1))
     scene = with_fades(random_scene(Kind.STROKE, 20, 64, 48, seed=1), *[(0, 0, 0)] * 19, (0, -0.85, 0))
     last = scene.points_of(19)
-    after = densify(step_for(scene, picture(), device, settings), grows=True).state.scene()
+    step = step_for(scene, picture(), device, settings)
+    densify(step, grows=True)
+    after = step.state.scene()
     assert len(after) == 20
     starts = np.stack([after.points_of(i)[[0, -1]] for i in range(20)])
     for end in (last[[0, 3]], last[[6, 9]]):

@@ -23,8 +23,8 @@ from warpsplat.drawing.trace.grids import Bools, Floats, at_pixels, bounding_box
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.drawing.width_steps import by_stroke, cut_at_steps, rejoined
 from warpsplat.errors import ImageError
-from warpsplat.fit.loop import Start, fit
-from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Fit, Problem, Run, Start
 from warpsplat.fit.rounding import finest
 from warpsplat.fit.settings import Density, Settings, solid_color
 from warpsplat.portable.elementary import exp, hypot

@@ -13,6 +13,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.portable import elementary
+from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.scene import Basis, FloatArray, Kind
 
 TIMED_STEPS = 4
@@ -38,16 +39,22 @@ SHRINKAGE = 0.92
 
 
 class Budget:
-    """A deadline (``time.monotonic``), and the time of a step in each phase."""
+    """A deadline (``time.monotonic``; infinite: none), and the time of a step in each phase."""
 
     def __init__(self, deadline: float) -> None:
         self.deadline = deadline
         self.costs: list[float] = []
-        """Time of a step in each phase [s]."""
+        """Time of a step in each phase [s]; none without a deadline, and once the last steps are planned."""
+        self._began, self._compiled = time.monotonic(), compile_seconds()
 
     def over(self) -> bool:
-        """Return whether the time is up."""
-        return time.monotonic() > self.deadline
+        """Return whether the time is up, and the last steps are not planned yet."""
+        return bool(self.costs) and time.monotonic() > self.deadline
+
+    def share(self) -> float:
+        """Return the share of the time that is spent, at most 1."""
+        spent = time.monotonic() - self._began
+        return min(spent / max(self.deadline - self._began, 1e-9), 1.0)
 
     def measure(
         self, state: FitState, settings: Settings, image: FloatArray, loss: CustomLoss | None = None
@@ -58,9 +65,16 @@ class Budget:
             begin = time.monotonic()
             step.time(TIMED_STEPS)
             self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)
-        return self.fit(settings, 0, 1.0)
+        self._began, self._compiled = time.monotonic(), compile_seconds()
+        return self._fit(settings, 0, 1.0)
 
-    def fit(self, settings: Settings, done: int, slowness: float) -> Settings:
+    def fit(self, step: Step) -> None:
+        """Continue with as many steps as end by the deadline, after some at the coarse size."""
+        worked = time.monotonic() - self._began - (compile_seconds() - self._compiled)
+        done = step.state.step
+        step.configure(self._fit(step.settings, done, worked / (done * self.costs[0])))
+
+    def _fit(self, settings: Settings, done: int, slowness: float) -> Settings:
         """Return ``settings`` with as many steps as end by the deadline, after ``done`` steps.
 
         ``slowness``: actual time of a step over the one measured.

@@ -28,8 +28,8 @@ PAIRS_PER_CHUNK = 1 << 18
 """Pairs of shapes that ``duplicates`` compares at once, to bound its memory."""
 
 
-def densify(step: Step, *, grows: bool) -> Step:
-    """Prune, grow and, by the settings, repaint and reorder the shapes; return the step for the new ones.
+def densify(step: Step, *, grows: bool) -> None:
+    """Prune, grow and, by the settings, repaint and reorder the shapes; rebuild the step for the new ones.
 
     ``grows``: whether the number of shapes and points follows the schedule; else it stays.
     """
@@ -49,7 +49,7 @@ def densify(step: Step, *, grows: bool) -> Step:
         scene = state.scene()
         order = np.lexsort((-areas(scene), scene.layer))
         state.parameters.rearrange(order, scene.take(np.arange(0)))
-    return step.rebuilt()
+    step.rebuild()
 
 
 def replace_shapes(step: Step, scene: Scene, keep: IndexArray, added: Scene, count: int) -> None:
@@ -69,10 +69,10 @@ def replace_shapes(step: Step, scene: Scene, keep: IndexArray, added: Scene, cou
     state.parameters.rearrange(keep, added)
 
 
-def remove_surplus(step: Step, count: int) -> Step:
+def remove_surplus(step: Step, count: int) -> None:
     """Remove the shapes with the least removal costs until ``count`` are left, but none of earlier levels.
 
-    Return the step for them, rendered.
+    These are rendered.
     """
     state = step.state
     for rounds_left in range(SURPLUS_ROUNDS, 0, -1):
@@ -85,10 +85,9 @@ def remove_surplus(step: Step, count: int) -> Step:
         removed = np.argsort(costs, kind="stable")[: -(-excess // rounds_left)]
         none = state.scene().take(np.arange(0))
         state.parameters.rearrange(np.setdiff1d(np.arange(len(costs)), removed), none)
-        step = step.rebuilt()
+        step.rebuild()
     step.render()
     step.measured_error()
-    return step
 
 
 def _kept(step: Step, scene: Scene, costs: FloatArray, wanted: int) -> IndexArray:
@@ -165,8 +164,8 @@ def _are_similar(
     return np.asarray((overlap > density.duplicate_overlap) & (distance < density.duplicate_color))
 
 
-def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
-    """Reset the shapes in which an update met a number that is not finite; return the step to continue with.
+def recover(step: Step, *, replaces: bool, last: bool = False) -> None:
+    """Reset the shapes in which an update met a number that is not finite.
 
     These are the shapes that hold such a number, or else those whose gradients were not finite. They get the
     values that they had after the last densification step, or at the start.
@@ -177,20 +176,19 @@ def recover(step: Step, *, replaces: bool, last: bool = False) -> Step:
     state, parameters = step.state, step.state.parameters
     flagged = parameters.take_broken()
     if not (last or flagged.any()):
-        return step
+        return
     invalid = parameters.invalid()
     if not (invalid | flagged).any():
-        return step
+        return
     scene = state.scene()
     reset = _with_twins(scene, invalid if invalid.any() else flagged)
     state.renewed += int(reset.sum())
     parameters.reset(reset)
     step.render()
     reset[: state.base] = False
-    if not (replaces and reset.any()):
-        return step
-    replace_shapes(step, scene, np.flatnonzero(~reset), scene.take(np.arange(0)), len(scene))
-    return step.rebuilt()
+    if replaces and reset.any():
+        replace_shapes(step, scene, np.flatnonzero(~reset), scene.take(np.arange(0)), len(scene))
+        step.rebuild()
 
 
 def _with_twins(scene: Scene, shapes: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -11,8 +11,8 @@ import functools
 import itertools
 from dataclasses import replace
 
-from warpsplat.fit.loop import Rounding, Start, fit
-from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import USUAL_ROUNDING, Fit, Problem, Run, Start
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import Scene
@@ -32,7 +32,7 @@ def fit_layered(problem: Problem, run: Run) -> Fit:
         is_last = settings is rounds[-1]
         whole = run.mapped(functools.partial(_of_all, done, steps, is_last))
         part = whole.part(done / steps, (done + settings.iterations) / steps)
-        rounding = Rounding() if is_last else None
+        rounding = USUAL_ROUNDING if is_last else None
         made = fit(replace(problem, settings=settings), part, Start(below=below), rounding)
         done += made.iterations
         renewed += made.renewed

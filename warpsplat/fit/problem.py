@@ -17,6 +17,7 @@ from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
 
 if TYPE_CHECKING:
+    from warpsplat.fit.state import Past
     from warpsplat.rendering.backend import Backend
 
 
@@ -49,6 +50,33 @@ class Problem:
     def having(self, **settings: Any) -> Problem:
         """Return the problem with some settings changed."""
         return replace(self, settings=replace(self.settings, **settings))
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Shapes that a fit starts from; by default new ones, as many as the settings ask for."""
+
+    scene: Scene | None = None
+    """Shapes to start from; their number is kept, unless ``past`` is given."""
+    past: Past | None = None
+    """Optimizer state of these shapes: with it their number follows the schedule."""
+    begin: int = 0
+    """Step of the schedule to start at."""
+    below: Scene | None = None
+    """Shapes of earlier levels, in front of which new ones are placed."""
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """How the coordinates of a fit are rounded for its file."""
+
+    per_pixel: float | None = None
+    """View box units per pixel; None: chosen by the shapes."""
+    by_bytes: bool = False
+    """Whether the choice weighs the error against the bytes, instead of allowing a small loss."""
+
+
+USUAL_ROUNDING = Rounding()
 
 
 @dataclass(eq=False)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpsplat.fit.export import export, shown_image
+from warpsplat.fit.problem import Rounding
 from warpsplat.fit.settings import Settings
 from warpsplat.portable import elementary
 from warpsplat.scene import OPACITY_RANGE, Basis, Paint, Scene
@@ -112,6 +113,7 @@ def freeze_opacities(step: Step) -> None:
     quadratic in the opacity, with its minimum at o.
     """
     parameters = step.state.parameters
+    step.state.opacities_frozen = True
     if step.settings.opaque:
         return
     step.renderer.forward_complete()
@@ -125,6 +127,15 @@ def freeze_opacities(step: Step) -> None:
     opacities = np.where(scene.paint == Paint.PICTURE, scene.opacities, opacities)
     parameters.assign(replace(scene, opacities=opacities.astype(np.float32)))
     parameters.hold("opacities", np.ones(len(scene), np.bool_))
+
+
+def round_stage(step: Step, rounding: Rounding) -> None:
+    """Choose the grid before the first stage, and freeze the points of the stage that is due."""
+    state, stage = step.state, stage_at(step.settings, step.state.step)
+    if state.grid is None:
+        state.grid = rounding.per_pixel or choose_grid(step, staged=True, rate_distortion=rounding.by_bytes)
+    if stage is not None:
+        freeze_stage(step, stage)
 
 
 def freeze_stage(step: Step, stage: int) -> None:

@@ -1,4 +1,4 @@
-"""The state of a fit between two steps as numbers and arrays; a resumed fit gives the same bits."""
+"""A fit between two steps, or its result, as numbers and arrays; a resumed fit gives the same bits."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from warpsplat.fit.checkpoint import Content, number
+from warpsplat.fit.problem import Fit
 from warpsplat.fit.settings import Settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
@@ -18,7 +19,7 @@ from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.saved import parameter_arrays, parameters_from
 from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import Scene
-from warpsplat.scene.arrays import between, typed
+from warpsplat.scene.arrays import between, from_arrays, to_arrays, typed
 
 SPARE_CAPACITY = 64
 """Largest capacity over what the shapes need: more than any run keeps from times when it had more shapes."""
@@ -32,6 +33,12 @@ MOST_RENEWED = 1 << 40
 TARGETS = 10.0
 """Largest value of the target: the image, less the viewer's difference from the render."""
 
+SAVED = {"per_pixel": float, "render_psnr": float, "estimated_psnr": float, "iterations": int, "renewed": int}
+"""Fields of a ``Fit`` that are saved beside its scene."""
+
+SAVED_LIMIT = 1e9
+"""Largest of them."""
+
 
 def step_content(step: Step) -> Content:
     """Return everything that ``step`` carries to the next one, copied to the host."""
@@ -42,7 +49,7 @@ def step_content(step: Step) -> Content:
         "curves": step.settings.curves,
         "per_pixel": float(state.per_pixel),
         "settled": state.opacities_frozen,
-        "rounding": state.rounding,
+        "rounding": state.grid is not None,
         "renewed": state.renewed,
         "colored": state.colored == state.parameters.revision,
         "generator": state.rng.bit_generator.state,
@@ -81,15 +88,15 @@ def step_from(
     rng.bit_generator.state = numbers["generator"]
     clock = backend.array(wp.int32, 1)
     clock.fill_(done)
+    grid = number(numbers, "per_pixel", float, 1e-3, FINEST)
     state = FitState(
         parameters,
         clock,
         rng,
         done,
-        number(numbers, "per_pixel", float, 1e-3, FINEST),
-        base=base,
+        base,
         opacities_frozen=number(numbers, "settled", bool),
-        rounding=number(numbers, "rounding", bool),
+        grid=grid if number(numbers, "rounding", bool) else None,
         renewed=number(numbers, "renewed", int, 0, MOST_RENEWED),
         colored=parameters.revision if number(numbers, "colored", bool) else -1,
     )
@@ -104,6 +111,18 @@ def step_from(
         step.loss_target.assign(shifted)
     step.record()
     return step
+
+
+def fit_content(made: Fit) -> Content:
+    """Return the result of a fit."""
+    return Content({name: kind(getattr(made, name)) for name, kind in SAVED.items()}, to_arrays(made.scene))
+
+
+def fit_from(content: Content, start: Scene) -> Fit:
+    """Return the result of a fit that began with ``start``, from what ``fit_content`` returned."""
+    numbers, most = content.numbers, SAVED_LIMIT
+    figures = {name: number(numbers, name, kind, -most, most) for name, kind in SAVED.items()}
+    return Fit(from_arrays(content.arrays, start), interrupted=False, **figures)
 
 
 def _capacity(renderer: Renderer) -> dict[str, int]:

@@ -62,6 +62,20 @@ def phase_at(settings: Settings, plan: list[Phase], step: int) -> Phase:
     return plan[0] if step < settings.coarse * settings.iterations else plan[-1]
 
 
+def work_done(settings: Settings, plan: list[Phase], step: int, begin: int = 0) -> float:
+    """Return the share of a fit's work that is done after ``step`` steps, if it began at the step ``begin``.
+
+    A step counts by the side length of its image: its time grows about with the outlines, not the areas.
+    """
+    change = settings.coarse * settings.iterations if len(plan) > 1 else 0.0
+    coarse, fine = (math.sqrt(phase.width * phase.height) for phase in (plan[0], plan[-1]))
+
+    def work(until: float) -> float:
+        return coarse * min(until, change) + fine * max(until - change, 0.0)
+
+    return (work(step) - work(begin)) / (work(settings.iterations) - work(begin))
+
+
 def opacity_threshold(density: Density, progress: float) -> float:
     """Return the opacity below which shapes are pruned after ``progress`` (share of the run)."""
     t = min(progress / density.stop, 1.0) if density.stop > 0 else 1.0

@@ -37,14 +37,12 @@ class FitState:
     rng: np.random.Generator
     step: int = 0
     """Steps done."""
-    per_pixel: float = GRIDS[-1]
-    """View box units per pixel in the file."""
     base: int = 0
     """Number of the first shapes, those of earlier levels (``fit.layered``), which stay."""
     opacities_frozen: bool = False
     """Whether the opacities are rounded and frozen."""
-    rounding: bool = False
-    """Whether coordinates are being rounded and held, in stages."""
+    grid: float | None = None
+    """View box units per pixel that coordinates are rounded to; None until rounding begins."""
     colored: int = -1
     """Revision of the parameters at the last choice of colours (``fit.palette``); -1: none so far."""
     known: tuple[int, Scene] | None = None
@@ -66,6 +64,11 @@ class FitState:
         clock.fill_(step)
         known = (past.moments, past.ages) if past else (None, None)
         return FitState(Parameters(scene, backend, *known), clock, rng, step, base=base)
+
+    @property
+    def per_pixel(self) -> float:
+        """View box units per pixel in the file."""
+        return GRIDS[-1] if self.grid is None else self.grid
 
     @property
     def shape_count(self) -> int:

@@ -64,7 +64,7 @@ def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
 class Step:
     """The launches of a training step, recorded for the arrays of ``state`` as they are.
 
-    When shapes come or go the arrays change: this step then refuses to run, ``rebuilt`` returns a new one.
+    When shapes come or go the arrays change: the step then refuses to run until ``rebuild`` records it again.
     """
 
     def __init__(
@@ -74,7 +74,6 @@ class Step:
         target: Target,
         *,
         capacity: Capacity | None = None,
-        loss_target: LossTarget | None = None,
         began: int | None = None,
     ) -> None:
         """Allocate the renderers and record the launches.
@@ -84,19 +83,45 @@ class Step:
             settings: of the run.
             target: what to fit, at the size of the phase.
             capacity: of the renderer's arrays; default: as much as a first render needs.
-            loss_target: what renders are compared with; default: the image of ``target``.
             began: steps done when the step was first recorded, by which scheduled weights go; default: now.
         """
-        self.state, self.settings, self.target = state, settings, target
+        self.state, self.settings = state, settings
+        self._aim(target, capacity, began)
+
+    def aim(self, target: Target) -> None:
+        """Continue with another target: at another size, or with another loss.
+
+        Adam's moments are scaled by how much steeper another loss is.
+        """
+        before = None if target.loss is self.target.loss else self.slope()
+        self._aim(target)
+        if before is not None:
+            self.state.parameters.scale_moments(self.slope() / max(before, 1e-12))
+
+    def _aim(self, target: Target, capacity: Capacity | None = None, began: int | None = None) -> None:
+        self.target = target
+        self.loss_target = self._new_loss_target()
+        """What renders are compared with: the image, or what ``evaluate_file`` makes of it."""
+        self._allocate(capacity, began)
+
+    def rebuild(self) -> None:
+        """Allocate and record again, for the state's new arrays."""
+        self._allocate(self.renderer.capacity)
+
+    def _new_loss_target(self) -> LossTarget:
+        target, backend = self.target, self.state.parameters.backend
+        return LossTarget(target.image, backend, target.viewport, target.weights, target.loss)
+
+    def _allocate(self, capacity: Capacity | None, began: int | None = None) -> None:
+        """Make the renderers, and record the launches."""
+        state, target = self.state, self.target
         self.began = state.step if began is None else began
-        model = model_for(settings, self.began, target.slack)
+        model = model_for(self.settings, self.began, target.slack)
         self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
         levels = [state.parameters.prefix(end) for end in state.parameters.level_ends]
         self.level_renderers = [Renderer(level, target.viewport, model=model) for level in levels]
-        image = (target.image, self.renderer.backend, target.viewport, target.weights, target.loss)
-        self.loss_target = loss_target or LossTarget(*image)
-        self._level_target = LossTarget(*image) if levels else self.loss_target
-        if settings.density.interval:
+        self._level_target = self._new_loss_target() if levels else self.loss_target
+        if self.settings.density.interval:
             self.renderer.expect_removal_costs()
         self._prepare()  # before the first launch runs, so that all kernels are compiled side by side
         unsized = self.renderers if capacity is None else self.level_renderers
@@ -173,16 +198,6 @@ class Step:
         """Continue with other settings."""
         self.settings = settings
         self.record()
-
-    def rebuilt(self) -> Step:
-        """Return a step for the state's new arrays, at the same size."""
-        return Step(
-            self.state,
-            self.settings,
-            self.target,
-            capacity=self.renderer.capacity,
-            loss_target=self.loss_target,
-        )
 
     def measured_error(self) -> float:
         """Return the mean squared error of the last render. Reads a number per tile back."""

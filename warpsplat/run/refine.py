@@ -16,9 +16,9 @@ from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import for_machines, show
-from warpsplat.fit.loop import Start, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.objective import loss_of_file
-from warpsplat.fit.problem import Problem, Run
+from warpsplat.fit.problem import Problem, Run, Start
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg

@@ -13,7 +13,7 @@ from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
-from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.problem import Fit, Problem, Run, Start
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.native import release_memory
@@ -35,8 +35,6 @@ from warpsplat.svg.numbers import hex_colors
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-    from warpsplat.fit.loop import Start
 
 
 @takes(Options)

@@ -12,8 +12,8 @@ from warpsplat.fit.budget import STYLE_BYTES
 from warpsplat.fit.export import finished
 from warpsplat.fit.grow import new_shapes
 from warpsplat.fit.importance import pixel_weights
-from warpsplat.fit.loop import Rounding, Start, fit
-from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.loop import fit
+from warpsplat.fit.problem import Fit, Problem, Rounding, Run, Start
 from warpsplat.fit.rounding import STAGES, stage_steps
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings

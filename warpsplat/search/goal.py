@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from warpsplat.errors import DeviceError
 from warpsplat.fit.budget import affordable_curves
-from warpsplat.fit.loop import Rounding, fit
+from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
-from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.problem import Fit, Problem, Rounding, Run
 from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary

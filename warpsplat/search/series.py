@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from warpsplat.fit.loop import Start
 from warpsplat.fit.options import limits_of
-from warpsplat.fit.problem import Run
+from warpsplat.fit.problem import Run, Start
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, Settings
 from warpsplat.fit.state import Past

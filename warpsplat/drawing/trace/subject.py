@@ -16,9 +16,11 @@ from warpsplat.drawing.trace.regions import MOST_NOISE
 from warpsplat.drawing.trace.seeds import EDGE
 from warpsplat.errors import counted
 from warpsplat.scene import FloatArray
-from warpsplat.svg.viewer import rows_of
 
 Subject = Literal["photo", "drawing", "pixel"]
+
+STRIP_PIXELS = 1 << 20
+"""Pixels that are rounded at a time."""
 
 TINY = 16
 """[px] side of a square that exact cells are best for; narrower ones may have as many pixels more."""
@@ -57,8 +59,9 @@ def _levels(image: FloatArray) -> Ints:
     """Return an image in levels of 0..255."""
     image = np.asarray(image)
     levels = np.empty(image.shape, np.int16)
-    for rows in rows_of(image.shape[1], image.shape[0]):
-        levels[rows] = np.round(image[rows] * 255)
+    step = 1 + STRIP_PIXELS // image.shape[1]
+    for top in range(0, len(image), step):
+        levels[top : top + step] = np.round(image[top : top + step] * 255)
     return levels
 
 
