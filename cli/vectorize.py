@@ -103,15 +103,27 @@ def command(
         make_several(request, numbers, given, hooks)
     else:
         keeping = {"checkpoint": checkpoint, "resume": resume, "checkpoint_every": checkpoint_every}
-        single(request, given, hooks, keeping, as_uri=as_uri)
+        single(request, given, hooks, keeping, preset=preset, as_uri=as_uri)
 
 
 def single(
-    request: Request, given: dict[str, Any], hooks: Hooks, keeping: dict[str, Any], *, as_uri: bool
+    request: Request,
+    given: dict[str, Any],
+    hooks: Hooks,
+    keeping: dict[str, Any],
+    *,
+    preset: str | None = None,
+    as_uri: bool = False,
 ) -> None:
     """Make a file of one image, and whatever hooks add.
 
-    ``keeping``: the arguments of ``warpsplat.vectorize`` for checkpoints.
+    Args:
+        request: Image, output and how to run.
+        given: Options, those of the preset included.
+        hooks: What else is made of the run.
+        keeping: The arguments of ``warpsplat.vectorize`` for checkpoints.
+        preset: Its name, for the command in a report.
+        as_uri: Whether the file is printed as a data URI.
     """
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import SVG_ENDINGS
@@ -150,6 +162,6 @@ def single(
 
         echo(data_uri(result.svg))
     values = {"image": str(image), "output": str(output), **result.as_dict()}
-    line = vectorize_command(settings, str(image), str(output), *request.flags)
+    line = vectorize_command(settings, str(image), str(output), *request.flags, preset=preset)
     done = Done(request, data, [(output, result)], line)
     finish(done, hooks, values, aside=as_uri or output == STANDARD)
