@@ -11,7 +11,7 @@ import pytest
 
 import warpsplat
 from warpsplat.drawing import draw
-from warpsplat.drawing.glyph_sheet import Sheet
+from warpsplat.drawing.glyph_sheet import GlyphSheet
 from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.scene import Canvas, FloatArray, Scene
 
@@ -133,7 +133,7 @@ def test_a_limit_that_does_not_bind_changes_nothing(quality: str, limit: dict[st
 def test_glyphs_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[int] = []
 
-    def find(image: FloatArray, *, removes_ground: bool) -> tuple[Sheet | None, FloatArray]:
+    def find(image: FloatArray, *, removes_ground: bool) -> tuple[GlyphSheet | None, FloatArray]:
         looked.append(1)
         return find_glyphs(image, removes_ground=removes_ground)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
-from warpsplat.drawing.glyph_sheet import Sheet
+from warpsplat.drawing.glyph_sheet import GlyphSheet
 from warpsplat.drawing.glyphs import find_glyphs
 from warpsplat.drawing.optics import SCALE
 from warpsplat.drawing.picture import Picture
@@ -56,7 +56,7 @@ class _Trace:
     """The picture without glyphs."""
     scene: Scene
     """All of it."""
-    sheet: Sheet | None = None
+    sheet: GlyphSheet | None = None
     glyphs: Drawing | None = None
 
 

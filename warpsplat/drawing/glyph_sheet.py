@@ -25,7 +25,7 @@ Ints = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class GlyphSheet:
     """The different glyphs of an image, and where they are in it."""
 
     image: FloatArray

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.drawing.glyph_sheet import Sheet, packed
+from warpsplat.drawing.glyph_sheet import GlyphSheet, packed
 from warpsplat.drawing.trace.grids import NO_REGION, border, dilated, linked_components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED
 from warpsplat.drawing.trace.regions import NEGLIGIBLE_NOISE
@@ -71,7 +71,7 @@ class _Glyph:
         return np.round(np.concatenate([self.ground, self.extreme])).tobytes()
 
 
-def find_glyphs(image: FloatArray, *, removes_ground: bool = False) -> tuple[Sheet | None, FloatArray]:
+def find_glyphs(image: FloatArray, *, removes_ground: bool = False) -> tuple[GlyphSheet | None, FloatArray]:
     """Return the sheet of an image's glyphs, if there are enough, and the image without them.
 
     An image with noise has none. ``image``: as for ``trace``; ``removes_ground``: whether what has the colour
@@ -104,7 +104,9 @@ def find_glyphs(image: FloatArray, *, removes_ground: bool = False) -> tuple[She
     sheet, corners = packed(shares)
     grounds = np.array([glyph.ground for glyph in glyphs])
     colors = _with_opacity(grounds + np.array(own_inks))
-    return Sheet(sheet, corners, sizes, colors, _with_opacity(grounds), copies[order], places[order]), rest
+    return GlyphSheet(
+        sheet, corners, sizes, colors, _with_opacity(grounds), copies[order], places[order]
+    ), rest
 
 
 def _with_opacity(levels: Floats) -> FloatArray:

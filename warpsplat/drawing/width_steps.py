@@ -22,7 +22,7 @@ SHARES = np.linspace(0, 1, 9)  # of a cubic, between which it is taken for strai
 APART = 1.0  # [px] between places along a stroke at which its width is measured, about
 
 
-class Profile(NamedTuple):
+class WidthProfile(NamedTuple):
     """The widths that a stroke should have from place to place."""
 
     cubics: Floats
@@ -90,11 +90,11 @@ def by_stroke(strokes: Scene, values: Floats) -> Floats:
     return np.array([own.sum() for own in _nearest_sums(strokes, _profiles(strokes), values)])
 
 
-def _profiles(strokes: Scene) -> list[Profile]:
+def _profiles(strokes: Scene) -> list[WidthProfile]:
     return [_profile(strokes.points_of(i), bool(strokes.closed[i])) for i in range(len(strokes))]
 
 
-def _profile(points: Floats, closed: bool) -> Profile:
+def _profile(points: Floats, closed: bool) -> WidthProfile:
     """Return a stroke of no given width, and the places where it is measured."""
     points = points.astype(np.float64)
     points = np.concatenate([points, points[:1]]) if closed else points
@@ -106,7 +106,7 @@ def _profile(points: Floats, closed: bool) -> Profile:
         at.append(number + (np.arange(count) + 0.5) / count)
         lengths.append(np.full(count, length / count))
     where = np.concatenate(at)
-    return Profile(
+    return WidthProfile(
         cubics,
         where,
         points_at(cubics[where.astype(np.intp)], where[:, None] % 1)[:, 0],
@@ -114,7 +114,7 @@ def _profile(points: Floats, closed: bool) -> Profile:
     )
 
 
-def _nearest_sums(strokes: Scene, profiles: list[Profile], values: Floats) -> list[Floats]:
+def _nearest_sums(strokes: Scene, profiles: list[WidthProfile], values: Floats) -> list[Floats]:
     """Return the sums of the values of pixels (height, width) that are nearest to each place of each stroke.
 
     Pixels farther away than a stroke is wide do not count.
@@ -180,7 +180,7 @@ def _cuts(widths: Floats, lengths: Floats, price: float) -> list[int]:
     return cuts[::-1]
 
 
-def _edge(profile: Profile, place: int, *, is_ring: bool) -> float:
+def _edge(profile: WidthProfile, place: int, *, is_ring: bool) -> float:
     """Return where a part of a stroke begins or ends that ends before a place, in cubics."""
     count, whole = len(profile.at), len(profile.cubics)
     if not is_ring and place in (0, count):

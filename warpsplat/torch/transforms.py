@@ -41,7 +41,7 @@ class Transformed(torch.autograd.Function):
         if image_grad is None:
             return (None,) * len(ctx.needs_input_grad)
         wanted = tuple(itertools.compress(ctx.names, ctx.needs_input_grad[2:]))
-        found = Gradients.apply(ctx.spec, ctx.names, wanted, image_grad, *ctx.saved_tensors)
+        found = TransformedBackward.apply(ctx.spec, ctx.names, wanted, image_grad, *ctx.saved_tensors)
         gradients = dict(zip(wanted, found, strict=True))
         return None, None, *map(gradients.get, ctx.names)
 
@@ -51,7 +51,7 @@ class Transformed(torch.autograd.Function):
         return _each(Transformed.apply, info.batch_size, in_dims, inputs), (0, 0)
 
 
-class Gradients(torch.autograd.Function):
+class TransformedBackward(torch.autograd.Function):
     """Gradient of the image, state of the pass, attributes -> gradients of the attributes ``wanted``."""
 
     @staticmethod
@@ -74,7 +74,7 @@ class Gradients(torch.autograd.Function):
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[Any, tuple[int, ...]]:
         """Return the gradients of one scene after the other."""
-        found = _each(Gradients.apply, info.batch_size, in_dims, inputs)
+        found = _each(TransformedBackward.apply, info.batch_size, in_dims, inputs)
         return found, (0,) * len(found)
 
 
