@@ -21,6 +21,7 @@ PLURAL = re.compile(rf"""\{{[^{{}}"']+(?:\[["']\w+["']\])?\}} (?:{NOUNS})\b""")
 
 OF_AT_LEAST_TWO = {
     "MAX_LINKED",
+    "two.shapes:,",
     "MOST_COLOR_COUNT",
     "worth.most:,",
     "space",

@@ -88,7 +88,7 @@ def test_pictures_are_spread_over_the_folder(folder: Path) -> None:
 def test_pytest_selects_by_device() -> None:
     rows = list(PARTS["suite"][0](Plan("cpu", (), suite=("tests/rendering/test_program.py", "-x"))))
     assert rows[-1].passed
-    assert "3 passed" in rows[-1].figure
+    assert "6 passed" in rows[-1].figure
 
 
 @pytest.mark.slow

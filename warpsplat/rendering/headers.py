@@ -13,8 +13,6 @@ import threading
 import time
 from pathlib import Path
 
-from warpsplat.rendering.cuda import runtime
-
 POLL_INTERVAL = 0.01
 """Seconds after which a thread that waits for the headers looks for them again."""
 
@@ -30,6 +28,8 @@ class SharedHeaders:
         self._lock = threading.Lock()
         self._maker: int | None = None
         """The thread that precompiles the headers, if one does."""
+        from warpsplat.rendering.cuda import runtime  # imports Warp, which drafts of drawings do without
+
         if hasattr(runtime(), "get_clang_pch_dir"):  # else Warp makes them for each thread
             runtime().get_clang_pch_dir = self.wait
 

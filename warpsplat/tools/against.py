@@ -151,7 +151,7 @@ def table(values: dict[str, Any]) -> str:
     """Return the results of ``compare`` as text."""
     this, other = values["sides"]
     lines = [
-        f"{values['kind']}, {values['shapes']} shapes, {values['width']}x{values['height']} px, "
+        f"{values['kind']}, {counted(values['shapes'], 'shape')}, {values['width']}x{values['height']} px, "
         f"opacity {values['opacity']:g}, {values['renderer']} renderer; {values['rounds']} rounds of each "
         f"in turn on {values['processor']}"
     ]

@@ -235,7 +235,7 @@
     fetching.add(run.id);
     try {
       const answer = await fetch(at("runs", run.id, "live.svg"));
-      const blob = answer.ok ? await answer.blob() : null;
+      const blob = answer.status === 200 ? await answer.blob() : null;
       if (blob && sources.get(run.id)?.key !== "result") setSource(run.id, number, URL.createObjectURL(blob));
     } catch {
       // the next state brings another one

@@ -180,9 +180,10 @@ class Service:
         return self._store.run(request.path_params["run"])
 
     async def show_live(self, request: Request) -> Response:
-        """Send the current shapes of a run."""
-        run = self._run(request)
-        return _svg(run.svg or run.live.picture, {})
+        """Send the current shapes of a run; nothing if it has none, or was replaced meanwhile."""
+        run = self._store.find_run(request.path_params["run"])
+        data = run.svg or run.live.picture if run else b""
+        return _svg(data, {}) if data else Response(status_code=204)
 
     async def show_result(self, request: Request) -> Response:
         """Send the file of a run, in one of ``FORMATS``."""

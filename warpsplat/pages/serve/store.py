@@ -148,6 +148,11 @@ class Store:
         with self._lock:
             return _find(self._runs, run, "run")
 
+    def find_run(self, run: str) -> QueuedRun | None:
+        """Return a run; None if there is none any more."""
+        with self._lock:
+            return self._runs.get(run)
+
     def stop_run(self, run: str) -> None:
         """End a run with its current shapes; one that waits leaves the queue."""
         with self._lock:
