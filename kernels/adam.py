@@ -7,7 +7,6 @@ from warpsplat.kernels.elementary import PI, power, sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
-BETA = wp.constant(0.8)  # of both moments: so no step is longer than its rate
 EPSILON = wp.constant(1.0e-12)  # the gradients of a mean over 10^6 pixels are about 1e-7
 
 
@@ -17,10 +16,13 @@ def advance(
     offset: wp.int32,
     step_count: wp.int32,  # length of the decay
     final: wp.float32,  # fraction of the learning rates at the end
+    beta1: wp.float32,  # shares of the moments that a step keeps; if they are equal, no step exceeds its rate
+    beta2: wp.float32,
     # Out:
     ages: wp.array[wp.int32],  # [shape_count] steps since the shape was placed, this one included
     clock: wp.array[wp.int32],  # [1] steps since the start, this one included
-    bias: wp.array[wp.float32],  # [shape_count] bias correction of the moments at that age
+    bias1: wp.array[wp.float32],  # [shape_count] bias correction of the moments at that age
+    bias2: wp.array[wp.float32],  # [shape_count]
     decay: wp.array[wp.float32],  # [1] fraction of the learning rates at this step
 ):
     """Count the step, on the device, so that a captured graph can be replayed unchanged.
@@ -30,7 +32,8 @@ def advance(
     """
     i = offset + wp.tid()
     ages[i] = ages[i] + 1
-    bias[i] = 1.0 - power(BETA, ages[i])
+    bias1[i] = 1.0 - power(beta1, ages[i])
+    bias2[i] = 1.0 - power(beta2, ages[i])
     if i == 0:
         clock[0] = clock[0] + 1
         progress = wp.min(float(clock[0]) / float(step_count), 1.0)
@@ -65,8 +68,11 @@ def adam_update(
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
     paint: wp.array[wp.int32],  # [shape_count]
     paints: wp.int32,  # the paints that have it, a bit each
-    bias: wp.array[wp.float32],  # [shape_count]
+    bias1: wp.array[wp.float32],  # [shape_count]
+    bias2: wp.array[wp.float32],  # [shape_count]
     decay: wp.array[wp.float32],  # [1]
+    beta1: wp.float32,  # as in ``advance``
+    beta2: wp.float32,
     rate: wp.float32,  # learning rate at the start, in the attribute's unit
     low: wp.float32,  # bounds
     high: wp.float32,
@@ -88,10 +94,10 @@ def adam_update(
         return
     current = rate * decay[0]
     g = grad[row, j]
-    m1 = BETA * moment1[row, j] + (1.0 - BETA) * g
-    m2 = BETA * moment2[row, j] + (1.0 - BETA) * g * g
-    m1_hat = m1 / bias[shape]
-    m2_hat = m2 / bias[shape]
+    m1 = beta1 * moment1[row, j] + (1.0 - beta1) * g
+    m2 = beta2 * moment2[row, j] + (1.0 - beta2) * g * g
+    m1_hat = m1 / bias1[shape]
+    m2_hat = m2 / bias2[shape]
     new = value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON)
     # Any number that is not finite makes one of these so: moment2 alone, infinite, would make the update 0.
     if not (wp.isfinite(new) and wp.isfinite(m2)):

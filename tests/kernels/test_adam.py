@@ -11,6 +11,7 @@ from tests.helpers import run
 from warpsplat.kernels import adam
 from warpsplat.scene import Kind
 
+BETAS = {"beta1": 0.8, "beta2": 0.8}
 BOTH = (1 << Kind.FILL) | (1 << Kind.STROKE)
 
 
@@ -25,7 +26,8 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "paint": wp.zeros(len(kind), dtype=int, device=device),
         "ages": wp.zeros(len(kind), dtype=int, device=device),
         "clock": wp.zeros(1, dtype=int, device=device),
-        "bias": wp.zeros(len(kind), dtype=float, device=device),
+        "bias1": wp.zeros(len(kind), dtype=float, device=device),
+        "bias2": wp.zeros(len(kind), dtype=float, device=device),
         "decay": wp.zeros(1, dtype=float, device=device),
         "broken": wp.zeros(len(kind), dtype=int, device=device),
     }
@@ -33,9 +35,9 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
 
 def step(s: dict[str, Any], gradient: np.ndarray, device: str, **values: float) -> None:
     s["grad"].assign(gradient)
-    decay = {"step_count": 20, "final": values.pop("final", 0.1)}
+    decay = {"step_count": 20, "final": values.pop("final", 0.1), **BETAS}
     run(adam.advance, s["ages"].shape[0], device, s, **decay)
-    settings = {"kinds": BOTH, "paints": 1, "rate": 0.1, "low": -100.0, "high": 100.0}
+    settings = {**BETAS, "kinds": BOTH, "paints": 1, "rate": 0.1, "low": -100.0, "high": 100.0}
     run(adam.adam_update, s["value"].shape, device, s, **{**settings, **values})
 
 

@@ -38,6 +38,9 @@ STROKE_STEPS = 240
 STROKE_RATE = 0.12
 """Learning rate of points, and of widths on both sides of a line [px]."""
 
+STROKE_BETAS = 0.9, 0.99
+"""``Settings.beta1`` and ``beta2``: strokes that meet need steadier steps than the shapes of a photograph."""
+
 ALIKE = 0.3
 """Difference of the widths of usual strokes up to which one pen drew them [px]."""
 
@@ -229,6 +232,8 @@ def _line_settings(settings: Settings, count: int) -> Settings:
         fine_pixels=min(settings.fine_pixels, FINE_PIXELS),
         density=Density(interval=0),
         rates={**fixed, "points": STROKE_RATE, "widths": STROKE_RATE / 2},
+        beta1=STROKE_BETAS[0],
+        beta2=STROKE_BETAS[1],
         mixed=False,
         renderer="exact",
         texture=0.0,

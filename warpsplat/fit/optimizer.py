@@ -19,8 +19,10 @@ from warpsplat.scene import Canvas, Unit
 class AdamBuffers:
     """Values that the updates of a step share."""
 
-    bias: wp.array = buffer(wp.float32, "shapes")
-    """Bias correction of each shape's moments at its age."""
+    bias1: wp.array = buffer(wp.float32, "shapes")
+    """Bias correction of each shape's first moments at its age."""
+    bias2: wp.array = buffer(wp.float32, "shapes")
+    """Likewise of the second moments."""
     decay: wp.array = buffer(wp.float32, 1)
     """Factor of the learning rates at this step."""
 
@@ -48,6 +50,8 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
         clock=clock,
         step_count=settings.iterations,
         final=settings.final_rate,
+        beta1=settings.beta1,
+        beta2=settings.beta2,
     )
     for name, group in parameters.groups.items():
         attribute = group.attribute
@@ -62,6 +66,8 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
             broken=parameters.broken,
             kinds=sum(1 << kind for kind in attribute.kinds),
             paints=sum(1 << paint for paint in attribute.paints),
+            beta1=settings.beta1,
+            beta2=settings.beta2,
             rate=settings.rates[name] * units[attribute.rate_unit],
             low=attribute.low[0] * units[attribute.low[1]],
             high=attribute.high[0] * units[attribute.high[1]],

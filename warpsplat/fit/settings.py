@@ -80,6 +80,8 @@ FRACTION = (0.0, 1.0)
 
 WEIGHT = (0.0, 1e6)
 
+MOMENT = (0.0, 0.9999)
+
 FITTED: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "fitted"}
 """Arguments of options that ask for fitted shapes."""
 
@@ -531,6 +533,8 @@ class Settings:
     rates: dict[str, float] = research(
         default_rates, "Adam's rates at the start, by attribute.", WEIGHT, parse=parse_rates
     )
+    beta1: float = research(0.8, "Share of Adam's first moments that a step keeps.", MOMENT)
+    beta2: float = research(0.8, "The same of the second moments; equal, no step exceeds its rate.", MOMENT)
     final_rate: float = research(0.2, "Fraction of each rate that is left at the end.", FRACTION)
     density: Density = research(
         Density, "Pruning and densification.", parse=parse_density, wanted="a mapping"
