@@ -123,9 +123,7 @@ def test_what_is_there_is_written(
     assert values["stopped"] is not finished
     assert (values["iterations"] == STEPS) is finished
     assert values["iterations"] > 0
-    assert (values["psnr"] is None) == (moment == "writing"), (
-        "the score is given up, but a started one is short"
-    )
+    assert values["psnr"] > 5, "scoring a small image takes no time"
     text = (tmp_path / "a.svg").read_text()
     assert ("stopped" not in text) == finished, "what was cut short does not pass for a finished result"
     assert values["bytes"] == len(text)

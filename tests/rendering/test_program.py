@@ -180,4 +180,5 @@ def test_a_gpu_does_without_graphs_that_it_refuses() -> None:
     assert len(told) == 2
     assert "not permitted" in told[0]
     assert "out of memory" in told[1]
-    assert len(done.stderr.splitlines()) == 2, "what Warp says itself is hidden"
+    others = [line for line in done.stderr.splitlines() if line and "compiling kernels" not in line]
+    assert others == told, "what Warp says itself is hidden"

@@ -44,10 +44,10 @@ def scored(
     *,
     interrupted: bool,
 ) -> Score | None:
-    """Return the score of a file; None if there is no time for it, or the run was stopped."""
-    quick = target[..., 0].size <= QUICK_PIXELS
-    perceptual = has_time_for_ssimulacra2(settings, target) and not interrupted
-    if (interrupted and not quick) or (not interrupted and run.stopped()):
+    """Return the score of a file; None for a large image whose run was stopped."""
+    quick, stopped = target[..., 0].size <= QUICK_PIXELS, interrupted or run.stopped()
+    perceptual = has_time_for_ssimulacra2(settings, target) and not stopped
+    if stopped and not quick:
         return None
     try:
         if reduction:
