@@ -11,14 +11,6 @@ from pathlib import Path
 
 from warpsplat.batch.executors.tasks import Outcome, Task
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-
-def signal_group() -> None:
-    """Send both signals to all processes of this group, as a terminal or a service manager does."""
-    for number in SIGNALS:
-        os.killpg(0, number)
-
 
 def main(channel: Connection, level: int, workers: int) -> None:
     while isinstance(task := channel.recv(), Task):
@@ -35,10 +27,6 @@ def main(channel: Connection, level: int, workers: int) -> None:
         if what == "wait":
             channel.recv()
             status = "stopped"
-        if what == "signal group":
-            signal_group()
         if what == "hang":
             time.sleep(60)
-        blocked = [int(number) for number in signal.pthread_sigmask(signal.SIG_BLOCK, ())]
-        figures = {"process": os.getpid(), "blocked": blocked}
-        channel.send(Outcome(task.number, status, figures=figures))
+        channel.send(Outcome(task.number, status, figures={"process": os.getpid()}))

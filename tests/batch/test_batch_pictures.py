@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from tests.batch.helpers import Answers, load_jobs, write
+from tests.batch.helpers import Answers, write
 from tests.cli.helpers import run
-from warpsplat.batch.executors.local import Serial
-from warpsplat.batch.executors.tasks import Stop
-from warpsplat.batch.manifest import NAME, Manifest, entry_of
+from warpsplat.batch.manifest import NAME, entry_of
 from warpsplat.batch.plan import plan_jobs
-from warpsplat.batch.run import Batch, JobOutcome
 from warpsplat.files.marks import mark_dxf, mark_eps, mark_pdf, mark_png, picture_key
 from warpsplat.files.output import may_replace
 
@@ -115,32 +111,6 @@ def test_results_beside_the_images_are_no_images(folder: Path, batch: Answers) -
         "b.png",
     ]
     assert len(plan_jobs([str(folder / "in" / "a-3.png")])) == 1, "unless it is named itself"
-
-
-def test_a_stopped_picture_is_made_again(folder: Path) -> None:
-    path = write(folder, "jobs: [{images: in/a.png, output: 'out/{stem}.png', curves: 3, iterations: 30}]")
-    reports: list[JobOutcome] = []
-
-    def done(stop: Stop) -> None:
-        notes = Manifest(folder / NAME)
-        notes.open()
-        with contextlib.closing(notes):
-            Batch(load_jobs(path), notes, on_outcome=reports.append).run(
-                Serial(), stop, lambda number, part: None
-            )
-
-    asked = iter([False] * 4)
-    done(lambda: next(asked, True))
-    done(lambda: False)
-    assert [report.status for report in reports] == ["stopped", "made"]
-
-
-def test_a_picture_without_its_package_is_found_before_the_work(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert run("batch", folder / "in" / "a.png", "-o", folder / "{stem}.pdf") == 2
-    assert "pip install typst" in capsys.readouterr().err
 
 
 def test_a_key_is_that_of_a_whole_picture(tmp_path: Path) -> None:

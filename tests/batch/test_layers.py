@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.batch.helpers import load_jobs, write
 from tests.cli.helpers import run
-from warpsplat.batch.command import flags_of
 from warpsplat.batch.layers import assigned, command_layer
 from warpsplat.batch.plan import BatchJob, home_of, in_shard, plan_jobs
 from warpsplat.errors import UsageError
@@ -40,12 +38,6 @@ def test_the_command_line_is_stronger_than_the_job_than_the_preset_than_the_defa
     assert (second.curves, second.seed, second.iterations, second.precision) == (4, 1, 1, 1)
     assert first.kind == second.kind == Kind.FILL
     assert [(s.rates["points"], s.rates["colors"]) for s in (first, second)] == [(0.2, 0.4), (0.1, 0.4)]
-
-
-def test_flags_that_are_not_given_say_nothing(folder: Path) -> None:
-    given: dict[str, Any] = {"open": True, "target_psnr": None, "max_bytes": "9KB", "minify": True}
-    assert flags_of(given) == {"open": True, "target-psnr": None, "max-bytes": "9KB", "minify": True}
-    assert command_layer({"curves": None}, ()) == {}
 
 
 def test_a_matrix_is_a_product(folder: Path) -> None:

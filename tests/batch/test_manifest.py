@@ -48,10 +48,6 @@ def test_a_torn_line_is_ignored_and_ends_where_the_next_begins(notes: Manifest) 
     assert len(notes.entries(notes.path.parent / "b.svg")) == 1
 
 
-def test_a_line_says_what_the_entry_does() -> None:
-    assert entry_of(GOOD.line()) == GOOD
-
-
 @pytest.mark.parametrize(
     "line",
     [

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Iterator
-from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
@@ -51,16 +49,6 @@ def test_workers_are_kept_and_their_notices_heard(tmp_path: Path, caplog: pytest
     assert "a notice" in caplog.text
 
 
-def test_signals_are_blocked_in_the_first_worker_too(tmp_path: Path) -> None:
-    """The first process starts multiprocessing's resource tracker, which unblocks them."""
-    resource_tracker._resource_tracker._stop()  # type: ignore[attr-defined]
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    with Pool(2) as used:
-        found = list(used.run(tasks(tmp_path, "a", "a"), never, ignored))
-    assert [outcome.figures["blocked"] for outcome in found] == [[signal.SIGINT, signal.SIGTERM]] * 2
-    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
-
-
 def test_a_death_costs_a_second_try_and_a_second_one_the_image(tmp_path: Path) -> None:
     found = outcomes(tasks(tmp_path, "die once", "die", "a"))
     assert [outcome.status for outcome in found] == ["made", "failed", "made"]
@@ -89,15 +77,6 @@ def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_pa
         found = list(used.run(drawn(), lambda: len(begun) == 2, advance))
     assert taken == [0, 1]
     assert sorted((outcome.number, outcome.status) for outcome in found) == [(0, "stopped"), (1, "stopped")]
-
-
-def test_what_has_begun_is_not_killed_though_that_was_not_received_yet(tmp_path: Path) -> None:
-    worker = pool.WorkerProcess(1)
-    worker.give(tasks(tmp_path, "wait")[0])
-    assert worker.channel.poll(60)
-    worker.stop()
-    assert [worker.channel.recv() for _ in range(2)][1].status == "stopped"
-    worker.end()
 
 
 def test_what_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -76,20 +76,15 @@ def test_batch_files_know_them(folder: Path) -> None:
         load_jobs(write(folder, "presets: {ink: {curves: 3}}\njobs: [{images: in/a.png, preset: oil}]"))
 
 
-def test_from_python() -> None:
-    assert warpsplat.load_preset("low-poly")["shape"] == "triangle"
-    with pytest.raises(UsageError, match="there is no preset 'oil'"):
-        warpsplat.load_preset("oil")
-
-
 def test_options_over_a_preset_from_python() -> None:
     """As on the command line."""
     pixels = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
     result = warpsplat.vectorize(pixels, preset="low-poly", curves=5, iterations=2, device="cpu")
     assert len(result.scene) == 5
     assert all(basis == Basis.POLYGON for basis in result.scene.basis)
-    with pytest.raises(UsageError, match="there is no preset 'oil'"):
-        warpsplat.vectorize(pixels, preset="oil")
+    for call in (warpsplat.load_preset, lambda name: warpsplat.vectorize(pixels, preset=name)):
+        with pytest.raises(UsageError, match="there is no preset 'oil'"):
+            call("oil")
     with pytest.raises(UsageError, match="settings are given, and preset as well"):
         warpsplat.vectorize(pixels, preset="ink", settings=warpsplat.make_settings())
     both = warpsplat.vectorize_several(pixels, [3, 5], preset="low-poly", iterations=2, device="cpu")

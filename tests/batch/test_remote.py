@@ -11,7 +11,7 @@ import pytest
 from tests.cli.helpers import run
 from tests.files.memory_store import png
 from warpsplat.batch.images import find_images
-from warpsplat.batch.plan import in_shard, plan_jobs
+from warpsplat.batch.plan import plan_jobs
 from warpsplat.errors import UsageError
 from warpsplat.files import remote as module
 from warpsplat.files.remote import is_remote, remote
@@ -73,23 +73,9 @@ def test_what_others_wrote_stays(store: Any, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.usefixtures("store")
-def test_shards_share_the_images_out() -> None:
-    jobs = plan_jobs(["memory://bucket/**/*.png", "memory://bucket/in/b.PNG"])
-    parts = [[job for job in jobs if in_shard(job, Path(), i, 3)] for i in (1, 2, 3)]
-    assert sum(map(len, parts)) == len(jobs) == 3
-    assert [str(job.output) for job in jobs][:2] == [
-        "memory://bucket/in/a.svg",
-        "memory://bucket/in/deep/c.svg",
-    ]
-
-
-def test_nothing_is_written_to_the_web(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_written_to_the_web_and_no_match_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UsageError, match="nothing matches"):
+        find_images("memory://bucket/*.tif", Path())
     monkeypatch.setattr(module, "READ_ONLY", ("memory",))
     with pytest.raises(UsageError, match="nothing can be written to memory://"):
         plan_jobs(["memory://host/a.png"])
-
-
-@pytest.mark.usefixtures("store")
-def test_a_pattern_that_nothing_matches() -> None:
-    with pytest.raises(UsageError, match="nothing matches"):
-        find_images("memory://bucket/*.tif", Path())

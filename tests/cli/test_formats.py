@@ -15,7 +15,6 @@ from warpsplat.errors import UsageError
 from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
 from warpsplat.run.formats import write_named
-from warpsplat.run.svg import load_svg, save_svg
 from warpsplat.run.vectorize import vectorize
 from warpsplat.svg.viewer import on_white, render_svg
 
@@ -56,19 +55,10 @@ def test_a_pdf_shows_what_the_svg_shows(tmp_path: Path) -> None:
     assert psnr(found, expected) > 35
     write_named(path, SVG)
     assert path.read_bytes() == data
-    write_named(path, SVG, zoom=2)
-    assert shown(path, 2 * 96 / 72).shape == expected.shape
-
-
-def test_a_pdf_of_ours_is_known(tmp_path: Path) -> None:
-    pytest.importorskip("typst")
-    path = tmp_path / "a.pdf"
-    write_named(path, SVG)
     assert may_replace(path)
-    path.write_bytes(path.read_bytes() + b"\n")
-    assert not may_replace(path)
-    path.write_bytes(b"%PDF-")
-    assert not may_replace(path)
+    (tmp_path / "a.svg").write_text(SVG)
+    assert run("render", tmp_path / "a.svg", "-o", path, "--scale", 2) == 0
+    assert shown(path, 2 * 96 / 72).shape == expected.shape
 
 
 def test_vectorize_and_refine_write_what_the_name_says(
@@ -90,15 +80,6 @@ def test_vectorize_and_refine_write_what_the_name_says(
         assert (png.format, png.size) == ("PNG", (60, 40))
 
 
-def test_the_library_writes_them_as_well(tmp_path: Path) -> None:
-    save_svg(
-        load_svg('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="7"><path d="M1 1h5v5z"/></svg>'),
-        tmp_path / "a.png",
-    )
-    with Image.open(tmp_path / "a.png") as png:
-        assert (png.format, png.size) == ("PNG", (9, 7))
-
-
 def test_a_missing_package_is_named_before_any_work(
     image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -111,14 +92,6 @@ def test_a_missing_package_is_named_before_any_work(
         with pytest.raises(UsageError, match=f"pip install {package}"):
             write_named(path, SVG)
         assert not path.exists()
-
-
-def test_render_makes_a_pdf(tmp_path: Path) -> None:
-    pytest.importorskip("typst")
-    svg = tmp_path / "a.svg"
-    svg.write_text(SVG)
-    assert run("render", svg, "-o", tmp_path / "a.pdf", "--scale", 2) == 0
-    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF-")
 
 
 PATHS = SVG.replace('clip-path="url(#c)"', "")

@@ -42,16 +42,13 @@ def test_an_exact_file(printed: Any, capsys: pytest.CaptureFixture[str]) -> None
         json.loads(Path("out", MANIFEST).read_text().splitlines()[0])["figures"],
     ]
     assert all(each["exact"] is True and each.get("psnr") is None for each in found)
+    made = printed("vectorize", "noise.png", *QUICK)
+    assert made["exact"] is False and made["psnr"] > 5
     again = printed("refine", "cells.svg", "cells.png", "-o", "b.svg", "--iterations", 1, "--device", "cpu")
     assert (again["psnr_before"], again["psnr"], again["exact"]) == (None, None, True)
     capsys.readouterr()
     assert run("eval", "cells.png", "cells.svg") == 0
     assert capsys.readouterr().out.splitlines()[0].split() == ["psnr", "exact"]
-
-
-def test_a_file_that_is_not_exact(printed: Any) -> None:
-    made = printed("vectorize", "noise.png", *QUICK)
-    assert made["exact"] is False and made["psnr"] > 5
 
 
 @pytest.mark.parametrize("command", ["vectorize", "refine", "several", "batch"])

@@ -59,21 +59,6 @@ def test_kept_elements_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "contains no path to refine: <path> (filter)" in one_line(capsys.readouterr().err)
 
 
-def test_transparent_images(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """``refine`` takes them as ``vectorize`` does, with the same ``--background``."""
-    svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
-    svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20h-30z" fill="red"/></svg>')
-    picture = Image.new("RGBA", (40, 30))
-    picture.paste((200, 40, 0, 255), (4, 4, 30, 24))
-    picture.save(image)
-    arguments = ("refine", svg, image, "-o", output, "--iterations", "30", "--device", "cpu", "--json")
-    for background, has_one in (("auto", False), ("#ffee00", True)):
-        assert run(*arguments, "--background", background, "--overwrite") == 0
-        values = json.loads(capsys.readouterr().out)
-        assert values["psnr"] > values["psnr_before"]
-        assert ("#fe0" in output.read_text()) == has_one
-
-
 def test_a_name_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("in").mkdir()

@@ -6,6 +6,7 @@ import json
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from PIL import Image
 import warpsplat
 from tests.cli.helpers import run
 from warpsplat.cli.main import main
-from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import PRESETS
 from warpsplat.run.suggest import Expected, Suggestion, choose
 
@@ -65,19 +65,9 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
     """The second run is stopped: its file is there as it was then, the third is none."""
     outputs = [tmp_path / f"{number}.svg" for number in (3, 6, 9)]
     done: list[warpsplat.Result] = []
-
-    def callback(now: Progress) -> bool:
-        return len(done) == 1
-
-    settings = warpsplat.make_settings(iterations=12)
+    stopping: dict[str, Any] = {"callback": lambda now: len(done) == 1, "ready": done.append}
     results = warpsplat.vectorize_several(
-        image,
-        [3, 6, 9],
-        settings=settings,
-        outputs=outputs,
-        device="cpu",
-        callback=callback,
-        ready=done.append,
+        image, [3, 6, 9], iterations=12, outputs=outputs, device="cpu", **stopping
     )
     assert [result.stopped for result in results] == [False, True]
     assert [output.exists() for output in outputs] == [True, True, False]
@@ -104,26 +94,24 @@ def test_the_library_names_the_function_for_several(image: Path) -> None:
         warpsplat.vectorize_several(image, [3, 9], outputs=["a.svg"])
 
 
-def test_a_drawing_has_no_more_shapes_than_regions(tmp_path: Path) -> None:
+def two_squares() -> np.ndarray:
     levels = np.full((48, 48, 3), 250, np.uint8)
-    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 30, 30), (20, 80, 160)
-    path = tmp_path / "drawing.png"
-    Image.fromarray(levels).save(path)
-    settings = warpsplat.make_settings(subject="drawing")
-    few, many, most = warpsplat.vectorize_several(path, [1, 9, 99], settings=settings, device="cpu")
+    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
+    return levels
+
+
+def test_a_drawing_has_no_more_shapes_than_regions() -> None:
+    few, many, most = warpsplat.vectorize_several(two_squares(), [1, 9, 99], subject="drawing", device="cpu")
     assert many.svg == most.svg and len(few.scene) < len(many.scene) <= 9
 
 
 @pytest.mark.parametrize("noise", [1, 90])
-def test_fits_to_a_drawing_start_from_scratch(tmp_path: Path, noise: int) -> None:
+def test_fits_to_a_drawing_start_from_scratch(noise: int) -> None:
     """Continuing from one another would cost quality; fits to what looks like a photograph do continue."""
-    levels = np.full((48, 48, 3), 250, np.uint8)
-    levels[8:30, 8:30], levels[20:40, 20:44] = (200, 130, 130), (120, 180, 160)
+    levels = two_squares()
     levels -= np.random.default_rng(0).integers(0, noise, levels.shape, np.uint8)
-    path = tmp_path / "picture.png"
-    Image.fromarray(levels).save(path)
     settings = warpsplat.make_settings(subject="photo", iterations=30, density={"interval": 2})
-    few, many = warpsplat.vectorize_several(path, [3, 6], settings=settings, device="cpu", threads=1)
+    few, many = warpsplat.vectorize_several(levels, [3, 6], settings=settings, device="cpu", threads=1)
     assert few.iterations == 30
     assert (many.iterations == 30) == (noise == 1)
 
@@ -177,11 +165,7 @@ def test_a_suggestion_in_words(
         (((64, 25.0, 7_000), (128, 25.3, 14_000)), 64, "Twice as many buy 0.3 dB for 7 kB more"),
         (((64, 25.0, 7_000), (128, 25.4, 14_000)), 128, "Up to 128 shapes, twice as many always"),
         (((64, 25.0, 7_000), (128, 26.0, 14_000), (256, 26.6, 28_000)), 128, "0.6 dB for 14 kB more"),
-        (
-            ((64, 25.0, 7_000), (128, 24.0, 14_000)),
-            64,
-            "less than 0.5 dB, about the least that can be seen, for each 10 kB",
-        ),
+        (((64, 25.0, 7_000), (128, 24.0, 14_000)), 64, "less than 0.5 dB, about the least that can be seen"),
         (((64, float("inf"), 900), (128, float("inf"), 900)), 64, ""),
         (((7, 20.0, 900),), 7, "no room for more than 7 shapes"),
     ],
@@ -200,12 +184,6 @@ def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest
     said = capsys.readouterr().out
     assert "A piece of pixel art (2 colours in cells of 4x4 px), which is traced" in said
     assert "the picture says how many shapes there are. --subject photo fits a number of shapes" in said
-
-
-def test_the_command_of_a_drawing_keeps_its_settings(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("vectorize", image, "--suggest", "--subject", "line", "--json") == 0
-    command = json.loads(capsys.readouterr().out)["command"]
-    assert command == f"warpsplat vectorize {image} --subject line -o photo.svg"
 
 
 def test_an_interrupted_suggestion_says_so(

@@ -64,20 +64,6 @@ def test_a_link_stays_a_link(image: Path, tmp_path: Path) -> None:
     assert real.read_text().startswith("<svg")
 
 
-def test_a_file_of_others_is_replaced_with_overwrite_only(
-    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(image.parent)
-    drawn = Path("photo.svg")
-    drawn.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
-    before = drawn.read_bytes()
-    assert run("vectorize", image, *QUICK) == 2
-    assert "photo.svg: exists and was not written by warpsplat" in one_line(capsys.readouterr().err)
-    assert drawn.read_bytes() == before
-    assert run("vectorize", image, "--overwrite", *QUICK) == 0
-    assert run("vectorize", image, *QUICK) == 0
-
-
 @pytest.mark.slow
 @pytest.mark.usual_seed
 def test_standard_input_and_output(image: Path) -> None:

@@ -12,38 +12,22 @@ import numpy as np
 import pytest
 
 import warpsplat
-from tests.fit.pictures import picture
-from tests.scenes import forms_scene, mixed_scene, random_scene
+from tests.run.helpers import CLEAR, PICTURE, Make, after, fitted, refined, slopes
+from tests.scenes import forms_scene, mixed_scene
 from warpsplat.errors import OutputError, UsageError, WarpsplatError
 from warpsplat.files.packed import is_packed, pack, unpack
 from warpsplat.fit import checkpoint
 from warpsplat.run import checkpoint as module
-from warpsplat.scene import Kind, Scene
-from warpsplat.svg.write import read_metadata, write_svg
+from warpsplat.svg.write import read_metadata
 
-PICTURE = picture(48, 36)
-CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
-CLEAR[:12, :20] = 0
 MASK = np.ascontiguousarray(PICTURE[..., 0])
 
 
-def after(count: int) -> Callable[[], bool]:
-    """Return a ``stop`` that is true after ``count`` steps."""
-    steps = itertools.count(1)
-    return lambda: next(steps) >= count
+def loss_from(begin: float) -> warpsplat.CustomLoss:
+    return warpsplat.CustomLoss(slopes, 0.1, with_target=True, begin=begin)
 
 
-def fitted(**given: Any) -> warpsplat.Result:
-    common = {"image": PICTURE, "curves": 10, "iterations": 56, "seed": 1, "subject": "photo"}
-    return warpsplat.vectorize(**{**common, "device": "cpu", "threads": 1, **given})
-
-
-def refined(scene: Scene, **given: Any) -> warpsplat.Result:
-    text = write_svg(scene)
-    return warpsplat.refine(text, PICTURE, iterations=56, device="cpu", threads=1, **given)
-
-
-RUNS: dict[str, Callable[..., warpsplat.Result]] = {
+RUNS: dict[str, Make] = {
     "closed": fitted,
     "open": lambda **given: fitted(open=True, **given),
     "splat": lambda **given: fitted(renderer="splat", **given),
@@ -58,7 +42,8 @@ RUNS: dict[str, Callable[..., warpsplat.Result]] = {
     "target": lambda **given: fitted(target_psnr=20.0, curves=10, iterations=12, **given),
     "ellipses": lambda **given: fitted(shape="ellipse", **given),
     "lines": lambda **given: fitted(shape="line", **given),
-    "refine": lambda **given: refined(random_scene(Kind.FILL, 6, 48, 36, seed=3), **given),
+    "loss": lambda **given: fitted(loss_from(0.5), colors=4, **given),  # which begins in the middle
+    "refine": refined,
     "refine forms": lambda **given: refined(forms_scene(48, 36).append(mixed_scene(48, 36)), **given),
 }
 
@@ -138,6 +123,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ({"image": PICTURE[:-1]}, "image differs"),
         ({"importance": MASK}, "mask differs"),
         ({"curves": 11}, r"curves differs \(10, now 11\)"),
+        ({"loss": loss_from(0.0)}, "loss differs"),
         ({"settings": warpsplat.make_settings(curves=10, rates={"points": 2.0})}, "differs"),
     ],
 )

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -15,6 +13,7 @@ import pytest
 import warpsplat
 from tests.fit.pictures import picture, step_for
 from tests.helpers import relative_error
+from tests.run.helpers import CLEAR, PICTURE, Both, fitted, slopes
 from tests.scenes import random_scene
 from warpsplat import CustomLoss
 from warpsplat.alpha import squares
@@ -29,12 +28,6 @@ from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
-PICTURE = picture(48, 36)
-CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
-CLEAR[:12, :20] = 0
-
-Both = tuple[Any, Any]
-
 
 def squared(image: FloatArray, target: FloatArray) -> Both:
     """The squared error; with opacity the mean of those on black and on white."""
@@ -47,24 +40,10 @@ def squared(image: FloatArray, target: FloatArray) -> Both:
     return squares(error) / 3, gradient
 
 
-def slopes(image: FloatArray, target: FloatArray) -> Both:
-    """Mean square of the differences of neighbours in a row, which even colours do not change."""
-    across = np.diff(image - target, axis=1)
-    gradient = np.zeros_like(image)
-    gradient[:, 1:] += 2 * across / across.size
-    gradient[:, :-1] -= 2 * across / across.size
-    return np.square(across).mean(), gradient
-
-
 def red(image: FloatArray, target: FloatArray) -> Both:
     """The squared error of red."""
     error = (image - target) * np.array([1, 0, 0], np.float32)
     return np.square(error[..., 0]), 2 * error / error[..., 0].size
-
-
-def fitted(loss: Any, **given: Any) -> warpsplat.Result:
-    common = {"curves": 10, "iterations": 56, "seed": 1, "device": "cpu", "threads": 1}
-    return warpsplat.vectorize(**{"image": PICTURE, **common, "loss": loss, **given})
 
 
 def shown(result: warpsplat.Result) -> FloatArray:
@@ -79,9 +58,7 @@ def scene_on(planes: int) -> Scene:
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
 @pytest.mark.parametrize("planes", [3, 4])
-def test_what_follows_from_the_squared_error_follows_from_a_loss_that_is_one(
-    device: str, planes: int, factor: float
-) -> None:
+def test_a_custom_squared_error_gives_the_same_estimates(device: str, planes: int, factor: float) -> None:
     """Removal costs, residuals, and where the error is: from the gradient, and the curvature measured."""
 
     def several(image: FloatArray, target: FloatArray) -> Both:
@@ -228,41 +205,21 @@ def test_a_fault_is_one_clear_line(fault: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"loss": CustomLoss(slopes), "subject": "drawing"}, "subject drawing and a loss function"),
-        ({"loss": "edgy"}, "loss must be one of l2, ssim, edges, not 'edgy'"),
-        (
-            {"loss": "ssim", "image": CLEAR, "subject": "photo"},
-            "loss ssim needs an image without transparency",
-        ),
-        ({"loss": "edges", "subject": "pixel"}, "subject pixel and loss edges cannot be combined"),
-    ],
-)
-def test_refusals(given: dict[str, Any], message: str) -> None:
+REFUSED: list[tuple[Callable[[], object], str]] = [
+    (lambda: fitted(CustomLoss(slopes), subject="drawing"), "subject drawing and a loss function"),
+    (lambda: fitted("edgy"), "loss must be one of l2, ssim, edges, not 'edgy'"),
+    (lambda: fitted("ssim", image=CLEAR, subject="photo"), "loss ssim needs an image without transparency"),
+    (lambda: fitted("edges", subject="pixel"), "subject pixel and loss edges cannot be combined"),
+    (lambda: CustomLoss(3), "a loss is a function of a render, not 3"),
+    (lambda: CustomLoss(slopes, -1), "squared_error must be a number from 0, not -1"),
+    (lambda: CustomLoss(slopes, begin=2), "begin must be a number from 0 to 1, not 2"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED)
+def test_refusals(call: Callable[[], object], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        fitted(**given)
-
-
-def test_declarations_are_checked() -> None:
-    with pytest.raises(UsageError, match="a loss is a function of a render, not 3"):
-        CustomLoss(3)
-    with pytest.raises(UsageError, match="squared_error must be a number from 0, not -1"):
-        CustomLoss(slopes, -1)
-    with pytest.raises(UsageError, match="begin must be a number from 0 to 1, not 2"):
-        CustomLoss(slopes, begin=2)
-
-
-def test_a_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
-    """Also where the loss begins, in the middle of the run."""
-    loss, path = CustomLoss(slopes, 0.1, with_target=True, begin=0.5), tmp_path / "run.checkpoint"
-    whole = fitted(loss, colors=4)
-    steps = itertools.count(1)
-    assert fitted(loss, colors=4, checkpoint=path, stop=lambda: next(steps) >= 28).stopped
-    with pytest.raises(UsageError, match="loss differs"):
-        fitted(CustomLoss(slopes, with_target=True), colors=4, checkpoint=path, resume=True)
-    assert fitted(loss, colors=4, checkpoint=path, resume=True).svg == whole.svg
+        call()
 
 
 def test_refining_is_judged_by_the_loss(device: str) -> None:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -16,36 +15,19 @@ import warpsplat
 from tests import fake_cuda
 from tests.cli.helpers import one_line
 from tests.fit.pictures import picture
-from tests.scenes import random_scene
+from tests.run.helpers import CLEAR, PICTURE, Make, fitted, refined
 from warpsplat.errors import DeviceError, ExitCode
 from warpsplat.fit.step import Step
 from warpsplat.rendering import device
 from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.run.result import STOPPED
-from warpsplat.scene import Kind
-from warpsplat.svg.write import read_metadata, write_svg
+from warpsplat.svg.write import read_metadata
 
 Fail = Callable[..., None]
 
-PICTURE = picture(48, 36)
-CLEAR = np.concatenate([PICTURE, np.ones_like(PICTURE[..., :1])], axis=2)
-CLEAR[:12, :20] = 0
 
-
-def fitted(**given: Any) -> warpsplat.Result:
-    usual = {"image": PICTURE, "curves": 10, "iterations": 56, "subject": "photo"}
-    return warpsplat.vectorize(**{**usual, "device": "cpu", "threads": 1, **given})
-
-
-def refined(**given: Any) -> warpsplat.Result:
-    text = write_svg(random_scene(Kind.FILL, 6, 48, 36, seed=3))
-    usual = {"image": PICTURE, "iterations": 56, "device": "cpu", "threads": 1}
-    return warpsplat.refine(text, **{**usual, **given})
-
-
-RUNS: dict[str, Callable[..., warpsplat.Result]] = {
-    "closed": fitted,
+RUNS: dict[str, Make] = {
     "open": lambda **given: fitted(open=True, **given),
     "paint": lambda **given: fitted(paint="auto", **given),
     "layered": lambda **given: fitted(curves=None, levels=(4, 12), **given),
@@ -103,30 +85,11 @@ def test_shapes_that_can_still_be_read_are(fail: Fail) -> None:
     assert caught.value.result.score.psnr > 15
 
 
-@pytest.mark.parametrize("run", [fitted, refined])
-def test_what_follows_the_fit_may_fail_too(
-    run: Callable[..., warpsplat.Result], fail: Fail, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Then the fit is whole, but for the pixels that should be empty."""
-    fail(-1)
-
-    def refused(*_: Any) -> None:
-        raise RuntimeError("Graph creation error: Warp CUDA error 2: out of memory (in function f)")
-
-    monkeypatch.setattr("warpsplat.fit.clear.clear_empty", refused)
-    monkeypatch.setattr("warpsplat.run.refine.clear_empty", refused)
-    with pytest.raises(DeviceError, match=r"not enough memory; .* after 56 steps") as caught:
-        run(image=CLEAR, background="none")
-    assert caught.value.result.iterations == 56
-
-
 def test_of_a_drawing_the_trace_is_left(fail: Fail, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     fail(-1)
 
     def refused(*_: Any) -> None:
-        raise RuntimeError(
-            "Error launching kernel: Warp CUDA error 719: unspecified launch failure (in function f)"
-        )
+        raise RuntimeError("Error launching kernel: Warp CUDA error 719: unspecified launch failure")
 
     monkeypatch.setattr(Program, "run", refused)
     output = tmp_path / "out.svg"
@@ -170,16 +133,9 @@ def test_a_failed_run_is_resumed_from_its_checkpoint(
 def test_several_numbers_keep_the_smaller_ones(fail: Fail) -> None:
     ready: list[warpsplat.Result] = []
     fail(80 + 30)
+    options: dict[str, Any] = {"subject": "photo", "device": "cpu", "threads": 1, "ready": ready.append}
     with pytest.raises(DeviceError) as caught:
-        warpsplat.vectorize_several(
-            picture(48, 36),
-            [6, 10],
-            iterations=80,
-            subject="photo",
-            device="cpu",
-            threads=1,
-            ready=ready.append,
-        )
+        warpsplat.vectorize_several(PICTURE, [6, 10], iterations=80, **options)
     assert len(ready) == 1 and not ready[0].stopped and caught.value.result.stopped
 
 
@@ -269,27 +225,14 @@ def test_a_batch_outlives_a_device(workers: int, tmp_path: Path) -> None:
     for number in range(3):
         pixels = (255 * picture(64, 48 + number)).astype("uint8")
         Image.fromarray(pixels).save(tmp_path / f"{number}.png")
-    batch = (
-        "-m",
-        "warpsplat",
-        "batch",
-        ".",
-        "--curves",
-        "8",
-        "--iterations",
-        "60",
-        "--workers",
-        str(workers),
-    )
-    done = fake_cuda.run(*batch, "--minify", "--subject", "photo", fail="sync:200", cwd=tmp_path)
+    words = f"-m warpsplat batch . --curves 8 --iterations 60 --workers {workers} --minify --subject photo"
+    done = fake_cuda.run(*words.split(), fail="sync:200", cwd=tmp_path)
     assert done.returncode == ExitCode.SOME_FAILED, done.stderr
     assert "its file has the shapes after" in done.stderr
-    told = [
-        line for line in done.stderr.splitlines() if line.startswith("warpsplat: the CPU is used; cuda:0")
-    ]
+    told = re.findall("^warpsplat: the CPU is used; cuda:0", done.stderr, re.MULTILINE)
     assert len(told) == (workers == 1)
     assert len(list(tmp_path.glob("*.svg"))) == 3, "the failed ones, too"
     failed = len(re.findall(r"^\[.*failed: ", done.stderr, re.MULTILINE))
-    again = fake_cuda.run(*batch, "--minify", "--subject", "photo", "--retry-failed", cwd=tmp_path)
+    again = fake_cuda.run(*words.split(), "--retry-failed", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     assert f"{failed} made, {3 - failed} skipped, 0 failed" in again.stdout

@@ -46,18 +46,10 @@ def flag() -> FloatArray:
     return image
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_a_fit_announces_all_its_kernels(kind: Kind, modules: tuple[list[str], list[str]]) -> None:
-    settings = make_settings(curves=6, kind=kind, iterations=60, density={"interval": 20})
-    y, x = np.mgrid[:48, :48].astype(np.float32) / 48
-    vectorize(np.stack([x, y, x * y], axis=2), settings, Backend.on("cpu", 2))
-    announced, loaded = modules
-    assert set(loaded) == set(announced)
-
-
-def test_a_drawing_announces_all_its_kernels_before_it_is_traced(
-    modules: tuple[list[str], list[str]],
-) -> None:
-    vectorize(flag(), make_settings(subject="drawing"), Backend.on("cpu", 2))
+@pytest.mark.parametrize("given", [{"kind": Kind.FILL}, {"kind": Kind.STROKE}, {"subject": "drawing"}])
+def test_a_run_announces_all_its_kernels(given: dict[str, Any], modules: tuple[list[str], list[str]]) -> None:
+    """Those of a drawing before it is traced."""
+    fit = {} if "subject" in given else {"curves": 6, "iterations": 60, "density": {"interval": 20}}
+    vectorize(flag(), make_settings(**fit, **given), Backend.on("cpu", 2))
     announced, loaded = modules
     assert set(loaded) == set(announced)

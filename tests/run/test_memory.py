@@ -6,13 +6,10 @@ import gc
 import io
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import cv2
 import numpy as np
 import pytest
-import warp as wp
 from PIL import Image
 
 import warpsplat
@@ -33,7 +30,6 @@ from warpsplat.run.memory import (
     DeviceMemory,
     check_refined,
     factor_for,
-    mask_factor,
     memory_limit,
     need,
     need_on_gpu,
@@ -147,15 +143,6 @@ def test_an_image_is_read_smaller(mode: str, kind: str, options: dict[str, objec
     assert (facts.kept > 0) == ("progressive" in options) and facts.deep == (mode == "I;16")
 
 
-def test_a_turned_image_is_read_smaller() -> None:
-    exif = Image.Exif()
-    exif[0x0112] = 6
-    data = encoded(pixels(), "JPEG", exif=exif, quality=95)
-    assert image_of(data, factor=2).shape == (33, 25, 3)
-    facts = image_facts(data)
-    assert facts and (facts.width, facts.height) == (HEIGHT, WIDTH)
-
-
 @pytest.mark.parametrize("mode", ["RGB", "RGBA"])
 def test_strips_of_an_image_are_those_of_all_of_it(mode: str) -> None:
     data = encoded(pixels(mode))
@@ -206,11 +193,6 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image() -> None:
     for limit, words in ((whole - 1, "processed at 33x25"), (whole, "")):
         made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=limit, name="big.png")
         assert words in made.reduced and bool(words) == bool(made.reduced)
-
-
-def test_a_small_mask_loses_nothing() -> None:
-    for width, factor in ((12_000, 4), (6000, 2), (5999, 1), (300, 1)):
-        assert mask_factor(HUGE, replace(HUGE, width=width), 4) == factor
 
 
 def test_refining_against_what_takes_too_much_is_refused(
@@ -273,16 +255,6 @@ def test_the_memory_of_a_gpu_limits_the_size_too() -> None:
     ):
         check_refined(data, Settings(), "a.png", DeviceMemory("cuda:0", 1 << 20))
     check_refined(data, Settings(), "a.png", DeviceMemory("cuda:0", 1 << 30))
-
-
-def test_what_is_free_on_a_gpu_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warp.synchronize_device", lambda _: None)
-    for processes, limit in ((1, 9 * 10**8), (3, 3 * 10**8)):
-        monkeypatch.setattr(memory.Sharing, "processes", processes)
-        device = SimpleNamespace(is_cpu=False, alias="cuda:0", free_memory=10**9, __str__=lambda: "cuda:0")
-        found = DeviceMemory.of(cast(wp.Device, device))
-        assert found and found.limit == limit
-    assert DeviceMemory.of(wp.get_device("cpu")) is None
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])

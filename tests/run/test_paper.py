@@ -34,23 +34,27 @@ def size(result: Result) -> tuple[str, str]:
     return found[1], found[2]
 
 
-def test_the_file_states_it() -> None:
-    result = made(drawing(dpi=(254, 254)), units="mm")
-    assert size(result) == ("12mm", "8mm")
-    assert result.notes[-1] == "12x8 mm: 254 pixels an inch, by the image file"
-    assert size(made(drawing(dpi=(254, 254)), units="cm")) == ("1.2cm", ".8cm")
-    assert size(made(Image.open(io.BytesIO(drawing(dpi=(254, 254)))), units="mm")) == ("12mm", "8mm")
-
-
-def test_dpi_counts_more() -> None:
-    assert size(made(drawing(dpi=(254, 254)), units="in", dpi=100)) == ("1.2in", ".8in")
-    assert size(made(drawing(), dpi=25.4)) == ("120mm", "80mm"), "alone it is in millimetres"
-
-
-def test_without_any_an_inch_is_96_pixels() -> None:
-    result = made(drawing(), units="in")
-    assert size(result) == ("1.25in", ".833333in")
-    assert "--dpi" in result.notes[-1]
+@pytest.mark.parametrize(
+    ("stated", "options", "wanted"),
+    [
+        (254, {"units": "mm"}, ("12mm", "8mm")),
+        (254, {"units": "cm"}, ("1.2cm", ".8cm")),
+        (254, {"units": "in", "dpi": 100}, ("1.2in", ".8in")),
+        (None, {"dpi": 25.4}, ("120mm", "80mm")),  # alone it is in millimetres
+        (None, {"units": "in"}, ("1.25in", ".833333in")),  # of 96 pixels
+        (254, {"size": "60x40mm"}, ("60mm", "40mm")),
+    ],
+)
+def test_the_size_is_that_of_the_option_or_the_file(
+    stated: int | None, options: dict[str, object], wanted: tuple[str, str]
+) -> None:
+    image = drawing(**({"dpi": (stated, stated)} if stated else {}))
+    result = made(image, **options)
+    assert size(result) == size(made(Image.open(io.BytesIO(image)), **options)) == wanted
+    if options == {"units": "mm"}:
+        assert result.notes[-1] == "12x8 mm: 254 pixels an inch, by the image file"
+    if options == {"units": "in"}:
+        assert "--dpi" in result.notes[-1]
 
 
 def test_pixels_stay_pixels() -> None:
@@ -58,10 +62,6 @@ def test_pixels_stay_pixels() -> None:
     result = made(drawing(dpi=(254, 254)))
     assert result.svg.startswith('<svg viewBox="0 0 960 640" xmlns="http://www.w3.org/2000/svg" height="80" ')
     assert not any("inch" in note for note in result.notes)
-
-
-def test_sheets_count_more() -> None:
-    assert size(made(drawing(dpi=(254, 254)), size="60x40mm")) == ("60mm", "40mm")
 
 
 def test_pixels_that_are_no_squares() -> None:

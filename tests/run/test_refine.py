@@ -45,18 +45,6 @@ def test_nothing_is_added(device: str) -> None:
         assert scored(result).psnr == pytest.approx(score_svg(result.svg, target).psnr)
 
 
-def test_refining_raises_the_psnr_and_keeps_the_paths(device: str) -> None:
-    scene = random_scene(Kind.FILL, count=6, width=48, height=40, seed=2)
-    target = render(scene, backend=Backend.on(device))
-    rng = np.random.default_rng(0)
-    moved = replace(scene, points=scene.points + rng.normal(0, 1, scene.points.shape).astype(np.float32))
-    text = write_svg(moved)
-    result, before = improved(text, target, make_settings(iterations=120), device)
-    assert scored(result).psnr > before + 4
-    assert scored(result).paths == 6
-    assert scored(result).nodes <= 6 * 6
-
-
 def test_no_improvement_changes_nothing(device: str) -> None:
     text = HEAD + FOREIGN["lines"]
     target = (on_white(render_svg(text)) / 255).astype(np.float32)

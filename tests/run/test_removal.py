@@ -10,8 +10,6 @@ import pytest
 import warpsplat
 from tests.drawing.trace.line_art import drawn
 from tests.runs import scored
-from warpsplat.errors import UsageError
-from warpsplat.fit.settings import make_settings
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_own
@@ -142,8 +140,3 @@ def test_transparent_images_have_none() -> None:
     result = made(image, "drawing", remove_background="everywhere")
     assert "no background was removed" in result.notes[-1]
     assert not any("no background" in note for note in made(image, "drawing", background="none").notes)
-
-
-def test_values_are_checked() -> None:
-    with pytest.raises(UsageError, match="remove-background must be one of outside, everywhere, not 'all'"):
-        make_settings(remove_background="all")
