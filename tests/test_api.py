@@ -112,15 +112,6 @@ def test_nothing_is_neither_a_path_nor_an_svg(nothing: str | bytes) -> None:
             read(nothing)
 
 
-def test_strokes_levels_and_palettes(device: str) -> None:
-    result = warpsplat.vectorize(photograph(), open=True, device=device, **QUICK)
-    assert (result.scene.kind == Kind.STROKE).all()
-    result = warpsplat.vectorize(photograph(), levels=(2, 6), iterations=60, device=device)
-    assert [level.shapes for level in result.levels] == [2, 6]
-    result = warpsplat.vectorize(photograph(), palette=["#ff0000", "#00f"], device=device, **QUICK)
-    assert {*np.unique(result.scene.colors, axis=0).ravel()} <= {0.0, 1.0}
-
-
 def test_a_callback_sees_the_history_and_ends_the_run(tmp_path: Path, device: str) -> None:
     seen: list[warpsplat.Progress] = []
 

@@ -16,7 +16,6 @@ import pytest
 
 from tests import ROOT
 from warpsplat import extensions
-from warpsplat.cli.main import COMMANDS
 
 CORE = ("errors", "native", "portable", "scene", "forms", "kernels")
 
@@ -51,9 +50,6 @@ ANYWHERE = {"", "_version", "extensions", "field_docs"}
 """Modules that all others may import."""
 
 EXTENSIONS = extensions.folders()
-
-HEAVY = {*("numpy", "warp", "torch", "cv2", "PIL", "resvg_py", "scipy", "jinja2", "starlette", "uvicorn")}
-"""What the command line imports only when a command runs: ``--help`` answers at once."""
 
 
 @functools.cache
@@ -159,25 +155,6 @@ def test_no_import_circles() -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
-
-
-def test_the_command_line_starts_light() -> None:
-    """What ``--help`` imports; and no file of a command names a heavy library at its top."""
-    reached, waiting = set(), {"cli.main"}
-    while waiting:
-        module = waiting.pop()
-        reached.add(module)
-        names = imported(at_import(modules()[module]))
-        assert not {name.partition(".")[0] for name in names} & HEAVY, module
-        parents = {module.rpartition(".")[0] for module in own(names)}
-        waiting |= (own(names) | parents) - reached
-    assert len(reached) > 3
-    commands = {command.target.partition(":")[0] for command in COMMANDS.values()}
-    hooks = {target.partition(":")[0] for one in EXTENSIONS.values() for target in one.run_hooks}
-    light = {name.removeprefix("warpsplat.") for name in commands | hooks}
-    for module, tree in modules().items():
-        if within(module, "cli") or module in light or module.endswith(".extension"):
-            assert not {name.partition(".")[0] for name in imported(at_import(tree))} & HEAVY, module
 
 
 # Kernels.

@@ -5,7 +5,6 @@ Python blocks that are whole programs are marked ``python``; fragments are marke
 
 from __future__ import annotations
 
-import inspect
 import re
 import runpy
 import shlex
@@ -18,13 +17,11 @@ import click
 import pytest
 from PIL import Image
 
-import warpsplat
 from tests import ROOT
 from tests.needs import WHOLE
 from tests.networks import stand_ins
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.fit.settings import PRESETS
-from warpsplat.run.options import OPTIONS
 from warpsplat.svg.viewer import render_svg
 
 pytestmark = [pytest.mark.usefixtures("single_precision"), WHOLE]
@@ -130,36 +127,6 @@ MADE = {
     "gallery/index.md",
 }
 """Pages that the site makes."""
-
-
-def test_words_of_the_pages_are_public() -> None:
-    """Python blocks use public names only."""
-    public = {*warpsplat.__all__, "torch", "pydiffvg", "errors", "scene"}
-    for page in PAGES:
-        for block in blocks(page, "python"):
-            names = re.findall(r"\bwarpsplat\.(\w+)", re.sub(r"[\"'].*?[\"']", "", block))
-            assert {*names} <= public, page.name
-
-
-OTHERWISE = re.compile(r"(?<![-\w`])(?<!zier )(?<!quadratic )(?<!cubic )curves?\b(?![=:`])")
-"""``curve`` in another meaning than that of a piece of an outline, and not as the name of the flag."""
-
-
-def test_one_word_for_one_thing() -> None:
-    """Shapes are no curves (docs/words.md), in what the program says of itself."""
-    found = (cli.get_command(click.Context(cli), name) for name in COMMANDS)
-    texts = [command.get_help(click.Context(command)) for command in found if command]
-    texts += [option.help for option in OPTIONS]
-    for public in ("vectorize", "refine", "render", "load_svg", "save_svg", "score", "Result", "Scene"):
-        texts.append(inspect.getdoc(getattr(warpsplat, public)) or "")
-    for page in ("README.md", "docs/index.md", "docs/tutorial.md", "docs/benchmarks.md"):
-        text = (ROOT / page).read_text("utf-8")
-        texts.append(re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL))
-    for text in texts:
-        plain = re.sub(
-            r"^ *curves: .*$|\{curves\}|curve, triangle|default: curve\]", "", text, flags=re.MULTILINE
-        )  # settings, arguments and values
-        assert not [plain[max(0, m.start() - 30) : m.end() + 10] for m in OTHERWISE.finditer(plain)]
 
 
 def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:

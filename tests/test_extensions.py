@@ -11,8 +11,7 @@ from tests import ROOT
 from tests.cli.helpers import one_line, run
 from tests.needs import WORDS
 from warpsplat import extensions
-from warpsplat.cli.hooks import Done, Hooks, RunHook, hook_options
-from warpsplat.cli.options import Request
+from warpsplat.cli.hooks import RunHook
 from warpsplat.errors import UsageError
 from warpsplat.extensions import Extension, load, load_renderer, renderer_names
 from warpsplat.fit.renderers import FitRenderer
@@ -70,38 +69,3 @@ def test_several_images_without_batches(
     found.pop("batch", None)
     assert run("vectorize", image, image) == 2
     assert "several images need" in one_line(capsys.readouterr().err)
-
-
-class Noting(RunHook):
-    """A hook with an option, which notes what it is called with."""
-
-    options = {"note": click.option("--note")}  # noqa: RUF012
-    noted: list[object] = []  # noqa: RUF012
-
-    def __init__(self, note: str | None) -> None:
-        self.note = note
-
-    def flag(self) -> str | None:
-        return "--note" if self.note else None
-
-    def finish(self, done: Done) -> None:
-        self.noted.append((self.note, done.command))
-
-
-def test_a_hook(found: dict[str, Extension]) -> None:
-    found.clear()
-    found["own"] = Extension(run_hooks=("tests.test_extensions:Noting",))
-
-    @click.command()
-    @hook_options("vectorize")
-    def command(note: str | None) -> None: ...
-
-    assert [parameter.name for parameter in command.params] == ["note"]
-    given = {"note": "a", "curves": 3}
-    hooks = Hooks("vectorize", given)
-    assert given == {"curves": 3}
-    hooks.check_mode("one file")
-    with pytest.raises(UsageError, match="--note takes one image"):
-        hooks.check_mode("several images")
-    hooks.finish(Done(Request(Path("a.png")), b"", [], "a line"))
-    assert Noting.noted == [("a", "a line")]

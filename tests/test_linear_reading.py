@@ -14,7 +14,7 @@ from warpsplat.errors import ImageError
 from warpsplat.scene import Scene
 from warpsplat.svg.document import Document, Element
 from warpsplat.svg.gradients import parse_link
-from warpsplat.svg.inspect import inspect_svg, read_svg_text, svg_size
+from warpsplat.svg.inspect import inspect_svg, path_nodes, read_svg_text, svg_size
 from warpsplat.svg.read import load_kept, load_scene
 
 LONG = 1_000_000
@@ -48,6 +48,12 @@ def test_invalid_numbers_are_ignored(attribute: str) -> None:
     )
     for name in ("opacities", "widths", "miter_limits"):
         assert np.array_equal(getattr(plain, name), getattr(odd, name))
+
+
+def test_the_text_of_a_file() -> None:
+    assert inspect_svg(f"{HEAD}><!--{'<path ' * (LONG // 5)}--></svg>").paths == 0
+    assert inspect_svg(f'{HEAD}><g style="fill:{SPACES}"/></svg>').nodes == 0
+    assert path_nodes(DIGITS + "e" * LONG) == 0
 
 
 def test_links_that_do_not_end() -> None:
@@ -102,6 +108,8 @@ REFUSED = {
     "colour": (f'<path fill="rgb({DIGITS}x,1,1)" d="M0 0h9v9z"/>', "."),
     "transform": (f'<path transform="scale({DIGITS}x)" d="M0 0h9v9z"/>', "."),
     "data": (f'<path d="M0 {DIGITS}xh9v9z"/>', "."),
+    "closed data": (f'<path d="M0 0{"z" * LONG}"/><text/>', "."),
+    "smooth data": (f'<path d="M0 0h9{"S1 1 2 2" * (LONG // 10)}"/><text/>', "."),
     "radius": (f'<circle r="{DIGITS}x"/>', "."),
     "points": (f'<polygon points="{DIGITS}x 9 9 9"/>', "."),
     "at-rules": (f"<style>{'@charset ' * (LONG // 10)}</style>{PATH}", "@-rules"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from PIL import Image
 
 from tests import ROOT, fake_cuda, needs, roofline
 from tests.on_gpu import __main__ as on_gpu
-from tests.on_gpu.parts import PARTS, Plan
+from tests.on_gpu.parts import Plan
 from tests.tracing.trace import Count, Memory
 from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import GPU_LANES
@@ -33,29 +32,6 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_parts_pass_on_the_cpu(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--device", "cpu", "--small", "--pictures", str(folder), "--count", "1", "--only", *QUICK]
-    status = on_gpu.main(arguments)
-    text = capsys.readouterr().out
-    assert status == 0, text
-    assert text.count("PASS") == len(QUICK)
-    table = text[text.index("| part |") :]
-    assert {line.split("|")[1].strip() for line in table.splitlines()[2:] if line.startswith("|")} == {*QUICK}
-    assert "0 of " in table.splitlines()[-1]
-
-
-@pytest.mark.slow
-def test_what_fails_does_not_end_the_others(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """There is no such device, so that each part ends with an error; nothing else does."""
-    assert on_gpu.main(["--device", "cuda:99", "--small", "--only", "bits", "kernels"]) == 1
-    text = capsys.readouterr().out
-    assert text.count("FAILED") == 2
-    assert "kernels: FAIL: 1 of 1" in text
-    assert "bits: FAIL: 1 of 1" in text
-    assert "cuda:99" in text
-
-
-@pytest.mark.slow
 def test_the_day_with_a_gpu_is_rehearsed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On the test device, with a PyTorch that knows nothing of it: what needs that is left out, no more."""
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")
@@ -73,22 +49,6 @@ def test_a_part_that_takes_too_long_is_ended() -> None:
     (row,) = on_gpu.rows_of("kernels", Plan("cpu", ()), limit=0.2)
     assert not row.passed
     assert "not done after 0.2 s" in row.figure
-
-
-def test_eight_minutes_are_enough() -> None:
-    assert sum(limit for _, limit in PARTS.values()) <= 480
-
-
-def test_pictures_are_spread_over_the_folder(folder: Path) -> None:
-    assert [os.path.basename(name) for name in on_gpu.pictures_in(folder, 2)] == ["a.png", "c.png"]
-    assert len(on_gpu.pictures_in(folder, 9)) == 4
-
-
-@pytest.mark.slow
-def test_pytest_selects_by_device() -> None:
-    rows = list(PARTS["suite"][0](Plan("cpu", (), suite=("tests/rendering/test_program.py", "-x"))))
-    assert rows[-1].passed
-    assert "6 passed" in rows[-1].figure
 
 
 @pytest.mark.slow

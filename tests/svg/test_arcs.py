@@ -80,8 +80,3 @@ def test_the_usual_forms_are_one_piece_each() -> None:
     line = as_arcs(np.array([[(0, 0), (1, 2), (2, 4), (3, 6)]], np.float64), TOLERANCE)
     assert line.bulges.tolist() == [0.0]
     assert line.points.tolist() == [[0, 0], [3, 6]]
-
-
-def test_arcs_need_fewer_pieces_than_lines() -> None:
-    curves = np.array(SHAPES["chain"], np.float64)
-    assert 3 * len(as_arcs(curves, 1e-4).bulges) < len(as_lines(curves, 1e-4).bulges)

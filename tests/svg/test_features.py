@@ -153,16 +153,12 @@ def test_reading_what_was_written_gives_the_same(group: dict[str, str]) -> None:
             np.testing.assert_allclose(a, b, atol=0.01)
 
 
-def test_a_coloured_background_is_painted() -> None:
-    scene = _read('<path d="M1 1h9v9z"/>', 'style="background-color:#08f"')
-    assert scene.canvas.background is not None
-    np.testing.assert_allclose(scene.canvas.background, [0, 8 / 15, 1], atol=1e-6)
-
-
-def test_twins_are_one_path() -> None:
-    scene = _read(SHAPES["fill and stroke"])
+def test_a_fill_with_its_stroke_is_one_path_on_the_background_of_the_root() -> None:
+    scene = _read(SHAPES["fill and stroke"], 'style="background-color:#08f"')
     assert scene.twin.tolist() == [0, 1, 0, 1]
     assert write_svg(scene).count("<path") == 2
+    assert scene.canvas.background is not None
+    np.testing.assert_allclose(scene.canvas.background, [0, 8 / 15, 1], atol=1e-6)
 
 
 def test_links_that_multiply_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.scenes import random_scene
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import Kind, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.svg import order
 from warpsplat.svg.order import MARGIN, by_color, by_opacity
@@ -36,55 +36,33 @@ def runs(scene: Scene) -> int:
     return len(list(itertools.groupby(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True))))
 
 
-def overlapping(boxes: FloatArray) -> list[tuple[int, int]]:
-    """Return the pairs of boxes less than ``MARGIN`` apart."""
-    low, high = np.split(boxes.astype(np.float64), 2, axis=1)
-    gaps = np.maximum(low[:, None], low) - np.minimum(high[:, None], high)
-    return [(i, j) for i, j in np.argwhere(np.triu(gaps.max(axis=2) < MARGIN - 1e-4, 1)).tolist()]
-
-
-def check(scene: Scene, found: IndexArray) -> None:
-    """Assert that ``found`` is a permutation in which overlapping shapes keep their order."""
-    np.testing.assert_array_equal(np.sort(found), np.arange(len(scene)))
-    place = np.argsort(found)
-    for i, j in overlapping(bounds(scene)):
-        assert place[i] < place[j], (i, j)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_overlapping_shapes_keep_their_order_and_runs_grow(seed: int) -> None:
-    scene = scattered(90, seed=seed)
-    found = by_opacity(scene)
-    check(scene, found)
-    assert len(overlapping(bounds(scene))) > len(scene), "there is something to keep"
-    assert runs(scene.take(found)) < 0.7 * runs(scene), "about half"
-    assert len(write_svg(scene.take(found))) < len(write_svg(scene))
-
-
+@pytest.mark.parametrize("block", [7, order.BLOCK])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_picture_stays(device: str, seed: int) -> None:
-    """And would not in any order."""
-    scene = scattered(60, seed=seed)
-    backend = Backend.on(device)
+def test_the_picture_stays_and_runs_grow(
+    device: str, seed: int, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And it would not in any order. Many shapes are ordered in blocks."""
+    monkeypatch.setattr(order, "BLOCK", block)
+    scene, backend = scattered(60, seed=seed), Backend.on(device)
     before = render(scene, backend=backend)
     found = by_opacity(scene)
-    assert (found != np.arange(len(scene))).any()
-    np.testing.assert_allclose(render(scene.take(found), backend=backend), before, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(found // block, np.arange(len(scene)) // block)
+    ordered = scene.take(found)
+    np.testing.assert_allclose(render(ordered, backend=backend), before, rtol=0, atol=1e-6)
     by_key = np.lexsort((scene.opacities, scene.kind))
     assert np.abs(render(scene.take(by_key), backend=backend) - before).max() > 0.1
+    assert runs(ordered) < (0.7 if block > len(scene) else 1) * runs(scene)
+    assert len(write_svg(ordered)) < len(write_svg(scene))
 
 
 def test_shapes_apart_are_sorted_and_shapes_in_one_place_stay() -> None:
     scene = scattered(12)
     places = np.repeat(np.arange(len(scene)), scene.point_counts())
-    moved = (scene.points + 500 * places[:, None]).astype(np.float32)
-    apart = replace(scene, points=moved)
+    apart = replace(scene, points=(scene.points + 500 * places[:, None]).astype(np.float32))
     kinds = len(set(zip(scene.kind.tolist(), scene.opacities.tolist(), strict=True)))
     assert runs(apart) > kinds == runs(apart.take(by_opacity(apart)))
-    for count in (0, 1):
-        assert by_opacity(scene.take(np.arange(count))).tolist() == list(range(count))
-    centre = replace(scene, points=(scene.points * np.float32(0.001)))
-    np.testing.assert_array_equal(by_opacity(centre), np.arange(len(scene)))
+    for same in (replace(scene, points=scene.points * np.float32(0.001)), *map(scene.take, ([], [0]))):
+        np.testing.assert_array_equal(by_opacity(same), np.arange(len(same)))
 
 
 @pytest.mark.parametrize("gap", [0.5 * MARGIN, 1.5 * MARGIN])
@@ -98,23 +76,11 @@ def test_soft_edges_of_neighbours_keep_their_order(gap: float) -> None:
     assert by_opacity(scene).tolist() == ([0, 1, 2] if gap < MARGIN else [1, 2, 0])
 
 
-@pytest.mark.parametrize("block", [1, 7, 80])
-def test_many_shapes_are_ordered_in_blocks(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = scattered(60)
-    whole = runs(scene.take(by_opacity(scene)))
-    monkeypatch.setattr(order, "BLOCK", block)
-    found = by_opacity(scene)
-    check(scene, found)
-    np.testing.assert_array_equal(found // block, np.arange(len(scene)) // block)
-    assert (runs(scene.take(found)) == whole) == (block >= len(scene))
-
-
-def test_colours_are_grouped() -> None:
-    scene = scattered(60, seed=2, levels=1)
-    rng = np.random.default_rng(0)
-    colors = rng.integers(0, 3, len(scene))
-    scene = replace(scene, colors=np.eye(3, dtype=np.float32)[colors])
-    found = by_color(scene)
-    check(scene, found)
+def test_colours_are_grouped(device: str) -> None:
+    colors = np.random.default_rng(0).integers(0, 3, 80)
+    scene = replace(scattered(60, seed=2, levels=1), colors=np.eye(3, dtype=np.float32)[colors])
+    found, backend = by_color(scene), Backend.on(device)
+    before, after = (render(each, backend=backend) for each in (scene, scene.take(found)))
+    np.testing.assert_allclose(after, before, rtol=0, atol=1e-6)
     alike = replace(scene, opacities=colors.astype(np.float32))
     assert runs(alike.take(found)) < 0.7 * runs(alike)

@@ -27,8 +27,3 @@ def test_about_the_bytes_of_a_file(per_pixel: float) -> None:
         assert estimated_size(scene, per_pixel) == pytest.approx(
             len(write_svg(scene, per_pixel=per_pixel)), rel=0.12
         )
-
-
-def test_no_shapes() -> None:
-    scene = logo().scene.take(np.zeros(0, np.intp))
-    assert estimated_size(scene, 8.0) == pytest.approx(len(write_svg(scene, per_pixel=8.0)), rel=0.3)
