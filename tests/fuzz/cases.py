@@ -15,14 +15,11 @@ from pathlib import Path
 from PIL import Image
 
 from tests.forks import Forks, Outcome
-from tests.fuzz import checkpoints, corpus
+from tests.fuzz import corpus
 from tests.fuzz import vocabulary as words
 from tests.fuzz.corpus import Seed
 from tests.fuzz.mutate import mutate_bytes, mutate_png, mutate_text
-from warpsplat.batch.manifest import Entry
 from warpsplat.errors import ExitCode
-from warpsplat.fit.settings import make_settings
-from warpsplat.run.result import job_key
 
 Mutation = Callable[[random.Random, bytes, bytes], bytes]
 """(generator, input, another input) -> changed input."""
@@ -48,8 +45,6 @@ class Command:
     """File that exists, complete, if and only if the exit code is 0."""
     stdin: str = ""
     """File for the standard input."""
-    consumes: bool = False
-    """Whether the input is gone if the exit code is 0."""
 
 
 @dataclass(frozen=True)
@@ -119,37 +114,6 @@ def _yaml_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
     return (Command(("batch", name, *flags), (USAGE, int(ExitCode.SOME_FAILED)), output=""),)
 
 
-def _option_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    """Try values of options, on an image that is none, so that no run takes long."""
-    given: list[str] = []
-    for _ in range(rng.choice((1, 1, 2))):
-        value = "".join(rng.choice(words.TOKENS) for _ in range(rng.choice((1, 1, 2))))
-        given += [rng.choice(words.TEXT_OPTIONS), value]
-    # No combination gives "--help" or the like, so that 0 is not right.
-    return (Command(("vectorize", "in/a.png", *given), (USAGE, INPUT)),)
-
-
-def _checkpoint_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    return (Command(checkpoints.arguments(name, GOOD_IMAGE), (USAGE, INPUT), "out.svg", consumes=True),)
-
-
-def _manifest_commands(rng: random.Random, name: str) -> tuple[Command, ...]:
-    arguments = ("batch", "in", "-o", "out", "--dry-run", "--manifest", name, *QUICK)
-    flags = rng.choice(((), ("--json",)))
-    return (Command((*arguments, *flags), (USAGE, int(ExitCode.SOME_FAILED))),)
-
-
-def _manifests() -> list[Seed]:
-    """Return manifests of a batch over the folder ``in``: of failures, of missing results, of both."""
-    settings = make_settings(curves=4, iterations=2)
-    images = {name: data for name, data in FILES.items() if name.startswith("in/")}
-    keys = {f"out/{Path(name).stem}.svg": job_key(settings, data) for name, data in images.items()}
-    figures = {"psnr": 20.5, "bytes": 700, "seconds": 1.5, "paths": 4, "missed": [], "levels": []}
-    failed = b"".join(Entry(name, key, "failed", error="not an image").line() for name, key in keys.items())
-    made = b"".join(Entry(name, key, "made", "0" * 64, figures=figures).line() for name, key in keys.items())
-    return [Seed(f"{len(data)}.jsonl", data) for data in (failed, made, made + failed)]
-
-
 def _changed_image(rng: random.Random, data: bytes, other: bytes) -> bytes:
     is_png = data.startswith(b"\x89PNG") and rng.random() < 0.6
     return (mutate_png if is_png else mutate_bytes)(rng, data, other)
@@ -170,9 +134,6 @@ TARGETS = {
     "image": Target(corpus.images, _changed_image, _image_commands, 9),
     "svg": Target(corpus.svgs, partial(mutate_text, words=words.SVG_WORDS), _svg_commands, 8),
     "yaml": Target(corpus.yamls, partial(mutate_text, words=words.YAML_WORDS), _yaml_commands, 2),
-    "options": Target(lambda: [Seed("in.txt", b"-")], lambda rng, data, other: data, _option_commands, 1),
-    "manifest": Target(_manifests, partial(mutate_text, words=words.JSON_WORDS), _manifest_commands, 1),
-    "checkpoint": Target(checkpoints.checkpoints, checkpoints.changed, _checkpoint_commands, 2),
 }
 
 
@@ -211,9 +172,7 @@ def run_case(forks: Forks, case: Case, folder: Path) -> Iterator[tuple[Outcome, 
         how = {"stdin": stdin, "memory": ADDRESSES, "patience": PATIENCE}
         outcome = forks.outcome(command.arguments, folder, **how)
         fault = judge(command, outcome, folder)
-        if command.consumes and outcome.code == 0:
-            fault = fault or ("the input is left" if given.exists() else "")
-        elif not fault and given.read_bytes() != case.data:
+        if not fault and given.read_bytes() != case.data:
             fault = "the input was changed"
         line = f"{case.target} {case.index} ({case.seed}): warpsplat {' '.join(command.arguments)}: {fault}"
         yield outcome, line if fault else ""

@@ -89,7 +89,7 @@ def mutate_png(rng: random.Random, data: bytes, other: bytes) -> bytes:
 
 
 def mutate_text(rng: random.Random, data: bytes, other: bytes, words: tuple[str, ...]) -> bytes:
-    """Change tokens of a text (XML, YAML or JSON), or seldom its bytes or its encoding."""
+    """Change tokens of a text (XML or YAML), or seldom its bytes or its encoding."""
     if rng.random() < 0.1:
         return mutate_bytes(rng, data, other)
     text = data.decode("utf-8", "replace")

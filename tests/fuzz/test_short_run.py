@@ -12,7 +12,7 @@ from tests.fuzz.cases import TARGETS, Case, Cases, Command, judge, lay_out, run_
 pytestmark = pytest.mark.slow
 
 SEED = 21
-COUNTS = {"image": 60, "svg": 40, "yaml": 50, "options": 50, "checkpoint": 30, "manifest": 40}
+COUNTS = {"image": 60, "svg": 40, "yaml": 50}
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -22,7 +22,7 @@ def test_no_input_breaks_the_command_line(forks: Forks, tmp_path: Path, target: 
         for outcome, fault in run_case(forks, cases[number], tmp_path / "deep" / "down" / "case"):
             assert not fault
             codes.append(outcome.code)
-    if target in ("image", "svg", "checkpoint"):
+    if target in ("image", "svg"):
         assert codes.count(0) > len(codes) / 20, "otherwise only the first checks are tested"
 
 

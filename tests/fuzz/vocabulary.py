@@ -109,21 +109,12 @@ YAML_WORDS = (
     "{", "}", "{{", "{}", "{x}", "'{stem}/../..'", "    matrix: {curves: [1, 2]}\n", "    preset: x\n", ".inf", "-.inf", ".nan", "0o777", "0x7f", "1_000", "190:20:30", "9" * 5000, "1e999",
 )  # fmt: skip
 
-JSON_WORDS = (
-    "v", "time", "output", "key", "event", "digest", "error", "figures", "made", "failed", "step", "curves", "per_pixel",
-    "colored", "generator", "room", "fits", "state", "slots", "PCG64", "true", "false", "null", "NaN", "Infinity", "out/a.svg", "1e308",
-    "\n", "{", "}", "[", "]", ",", '"', "[" * 2000, "[0]", "{}\n", "null,", "1e999", "9" * 5000, '"fits": [],', '"\\ud800"',
-    '"\\u0000"', "-", "\0", '{"v": 1}\n', '"v": 2', "../../x.svg",
-)  # fmt: skip
 
 NUMBERS = ("0", "-0", "1", "-1", "0.5", "1e-9", "1e9", "1e30", "-1e30", "3.5e38", "1e308", "-1e309", "1e-320", "nan", "inf",
            "NaN", "Infinity", "9" * 400, "0." + "0" * 300 + "1", "2147483648", "-2147483649", "65536", "1e", "--1", "+.5e+2",
            "0x10", "1_000", "١٢", "1,5", "", "50%", "-50%", "1e400%", "2em", "3ex", "1in", "5rem", "10vw", "1q", "90deg")  # fmt: skip
 """Replacements for numbers."""
 
-TEXT_OPTIONS = ("--max-memory", "--colors", "--palette", "--levels", "--paint", "--background", "--size", "--page", "--units", "--title",
-                "--subject", "--time-budget", "--max-bytes", "--target-psnr", "--curves", "--iterations", "--seed", "--precision", "--threads",
-                "--device", "--quality", "--renderer", "-o")  # fmt: skip
 
 FITS = (
     ("--closed",), ("--open",), ("--mixed",), ("--paint", "auto"), ("--paint", "linear"), ("--paint", "radial", "--background", "none"),
@@ -135,9 +126,6 @@ FITS = (
 )  # fmt: skip
 """Options of ``vectorize``."""
 
-TOKENS = (*NUMBERS, "#f00", "#ff8800,#fff", "#", "2,4", "4,2", "1,,4", "linear", "radial", "a4", "50x40mm", "0x0mm", "mm", "none", "photo", "1EB", "s", "m", "h", "ms", "min", "KB", "MiB", "GB", "60s", "1.5h", "10GB", "100 kb", " 5", "auto", "cpu", "cuda:0", "cuda:-1",
-          "draft", "exact", "x.svg", "/", ".", "..", "a/b.svg", "é.svg", "\udcff.svg", "\n.svg", "\x1b[2J.svg", "x" * 300, "-", "--", "٣s", "x.SVG",
-          "good.picture", "in", "in/a.png/x.svg", "/dev/null", "/dev/full", "/proc/x.svg")  # fmt: skip
 
 PAINTS = ("red", "#123", "#4080c0", "rgb(10%,50%,90%)", "hsl(90,50%,50%)", "teal")
 
