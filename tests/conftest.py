@@ -94,6 +94,18 @@ def single_precision() -> Iterator[None]:
 
 
 @pytest.fixture
+def cli(capfd: pytest.CaptureFixture[str]) -> Any:
+    from tests.cli.helpers import Said, run
+
+    def ran(*arguments: object, code: int = 0) -> Said:
+        capfd.readouterr()
+        assert run(*arguments) == code
+        return Said(*capfd.readouterr())
+
+    return ran
+
+
+@pytest.fixture
 def image(tmp_path: Path) -> Path:
     """With grain, so that it is taken for a photograph."""
     path = tmp_path / "photo.png"

@@ -180,7 +180,6 @@ def decorated(decorator: str) -> Iterator[tuple[str, ast.FunctionDef, list[str]]
 
 
 KERNELS = {name: (node, lines) for name, node, lines in decorated("wp.kernel")}
-FUNCTIONS = {node.name: node for _, node, _ in decorated("wp.func")}
 by_kernel = pytest.mark.parametrize(("kernel", "lines"), KERNELS.values(), ids=KERNELS.keys())
 
 
@@ -206,44 +205,6 @@ def test_signatures(kernel: ast.FunctionDef, lines: list[str]) -> None:
         else:
             assert argument.arg not in outputs, f"{argument.arg}: a number cannot be written to"
     assert ast.get_docstring(kernel)
-
-
-STORES = {"atomic_add", "atomic_or", "atomic_and", "atomic_min", "atomic_max", "atomic_sub"}
-
-
-def written(kernel: ast.FunctionDef, parameters: set[str]) -> set[str]:
-    """Names of arrays that the kernel, or a function of ours that it hands them to, stores into, be they
-    fields of a structure.
-    """
-    names: set[str] = set()
-    fields: dict[str, str] = {}
-    for node in ast.walk(kernel):
-        targets: list[ast.expr] = []
-        if isinstance(node, ast.Assign):
-            targets = node.targets
-            fields |= {
-                ast.unparse(t): ast.unparse(node.value) for t in targets if isinstance(t, ast.Attribute)
-            }
-        elif isinstance(node, ast.AugAssign):
-            targets = [node.target]
-        elif isinstance(node, ast.Call):
-            called = ast.unparse(node.func).rpartition(".")[2]
-            if called in STORES:
-                names.add(ast.unparse(node.args[0]))
-            elif called in FUNCTIONS:
-                order = [a.arg for a in FUNCTIONS[called].args.args]
-                given = dict(zip(order, map(ast.unparse, node.args), strict=True))
-                for stored in written(FUNCTIONS[called], set(order)):
-                    name, dot, field = stored.partition(".")
-                    names.add(given[name] + dot + field)
-        names |= {ast.unparse(target.value) for target in targets if isinstance(target, ast.Subscript)}
-    names = {fields.get(name, name) for name in names}
-    return {name for name in names if name.partition(".")[0] in parameters}
-
-
-@by_kernel
-def test_what_is_written_is_an_output(kernel: ast.FunctionDef, lines: list[str]) -> None:
-    assert written(kernel, {a.arg for a in kernel.args.args}) == output_names(kernel, lines)
 
 
 def test_kernels_are_launched_by_name_only() -> None:

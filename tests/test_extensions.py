@@ -8,7 +8,7 @@ import click
 import pytest
 
 from tests import ROOT
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli
 from tests.needs import WORDS
 from warpsplat import extensions
 from warpsplat.cli.hooks import RunHook
@@ -63,9 +63,6 @@ def test_an_unknown_renderer() -> None:
             load_renderer(name)
 
 
-def test_several_images_without_batches(
-    found: dict[str, Extension], image: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_several_images_without_batches(found: dict[str, Extension], image: Path, cli: Cli) -> None:
     found.pop("batch", None)
-    assert run("vectorize", image, image) == 2
-    assert "several images need" in one_line(capsys.readouterr().err)
+    assert "several images need" in cli("vectorize", image, image, code=2).line

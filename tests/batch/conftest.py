@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from tests.batch.helpers import Answers, answers
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli
 from tests.files.memory_store import store  # noqa: F401
 
 
@@ -23,10 +23,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def batch(capsys: pytest.CaptureFixture[str]) -> Answers:
+def batch(cli: Cli) -> Answers:
     def answered(*arguments: object, code: int = 0) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-        capsys.readouterr()
-        assert run(*arguments, "--json") == code
-        return answers(capsys.readouterr().out)
+        return answers(cli(*arguments, "--json", code=code).out)
 
     return answered

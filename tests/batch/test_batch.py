@@ -13,19 +13,16 @@ import pytest
 from PIL import Image
 
 from tests.batch.helpers import Answers, answers, load_jobs, write
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line, run
 from warpsplat.batch.display import BatchDisplay
 from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.run import JobOutcome
 
 
-def test_a_run_reports_skips_and_redoes(
-    folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
-) -> None:
+def test_a_run_reports_skips_and_redoes(folder: Path, cli: Cli, batch: Answers) -> None:
     text = "defaults: {curves: 4, iterations: 6, device: cpu, output: out}\njobs: [{images: in/*.png}]\n"
     path = write(folder, text)
-    assert run("batch", path) == 5
-    captured = capsys.readouterr()
+    captured = cli("batch", path, code=5)
     assert "3 images: 2 made, 0 skipped, 1 failed" in captured.out
     assert "broken.png: not an image" in captured.err
     assert sorted(os.listdir(folder / "out")) == ["a.svg", "b.svg", NAME]
@@ -44,14 +41,13 @@ def test_a_run_reports_skips_and_redoes(
     assert batch("batch", path)[1]["made"] == 1
 
     write(folder, text.replace("curves: 4", "curves: 5"))
-    assert run("batch", path, "-q") == 0
-    assert capsys.readouterr() == ("", "")
+    assert cli("batch", path, "-q") == ("", "")
     assert all((folder / "out" / n).read_text().count("<path") == 5 for n in ("a.svg", "b.svg"))
 
 
 @pytest.mark.parametrize("as_json", [False, True])
 def test_an_interrupted_run_says_what_is_left(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, as_json: bool
+    folder: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch, as_json: bool
 ) -> None:
     for i in range(5):
         shutil.copy(folder / "in" / "a.png", folder / "in" / f"more{i}.png")
@@ -64,8 +60,7 @@ def test_an_interrupted_run_says_what_is_left(
     monkeypatch.setattr(BatchDisplay, "add", interrupting)
     settings = ("--curves", 4, "--iterations", 6, "--device", "cpu", "--workers", 1)
     arguments = ("batch", folder / "in", "-o", folder / "out", *settings, *(["--json"] if as_json else []))
-    assert run(*arguments) == 130
-    captured = capsys.readouterr()
+    captured = cli(*arguments, code=130)
     assert one_line(captured.err) == "warpsplat: interrupted; the same command goes on with the rest"
     if as_json:
         (image,), values = answers(captured.out)
@@ -74,8 +69,7 @@ def test_an_interrupted_run_says_what_is_left(
     else:
         assert "\n9 images: 1 made, 0 skipped, 0 failed, 8 not started (" in captured.out
     monkeypatch.undo()
-    assert run(*arguments) == 5
-    out, err = capsys.readouterr()
+    out, err = cli(*arguments, code=5)
     assert "not started" not in out and "not_started" not in out and "goes on" not in err
 
 
@@ -95,7 +89,7 @@ class PanicException(BaseException):
 
 
 def test_whatever_an_image_throws_is_its_own_failure(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    folder: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     """Even what is no ``Exception``."""
     words = "renderer gave up: index out of bounds"
@@ -107,26 +101,23 @@ def test_whatever_an_image_throws_is_its_own_failure(
 
     monkeypatch.setattr("warpsplat.run.prepare.image_of", load)
     text = "jobs: [{images: 'in/[ab].png', curves: 3, iterations: 3, output: out, device: cpu}]"
-    assert run("batch", write(folder, text), "--json") == 5
-    captured = capsys.readouterr()
+    captured = cli("batch", write(folder, text), "--json", code=5)
     images, _ = answers(captured.out)
     assert [r["status"] for r in images] == ["failed", "made"]
     assert "a.png" in images[0]["error"] and words in images[0]["error"] and words in captured.err
 
 
-def test_a_line_break_in_a_name_breaks_no_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_break_in_a_name_breaks_no_line(folder: Path, cli: Cli) -> None:
     path = write(folder, 'jobs: [{images: "in/\\nx.png", device: cpu}]\n')
-    assert run("batch", path) == 5
-    assert capsys.readouterr().err.splitlines() == [
+    said = cli("batch", path, code=5).err
+    assert said.splitlines() == [
         "[1/1] failed: in/\\nx.png: no such file".replace("in/", f"{folder}/in/"),
         "failed:",
         f"  {folder}/in/\\nx.png",
     ]
 
 
-def test_another_mask_makes_another_result(
-    folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
-) -> None:
+def test_another_mask_makes_another_result(folder: Path, cli: Cli, batch: Answers) -> None:
     """By its content; one that is missing or of other proportions is the failure of its image."""
     (folder / "masks").mkdir()
     mask = folder / "masks" / "face.png"
@@ -147,8 +138,7 @@ def test_another_mask_makes_another_result(
         (mask.unlink, "no such file"),
     ):
         break_it()
-        assert run("batch", path) == 5
-        message = capsys.readouterr().err
+        message = cli("batch", path, code=5).err
         assert f"{folder / 'in' / 'a.png'}: {mask}: {cause}" in message
 
 
@@ -156,7 +146,7 @@ SMALL = ("--curves", "3", "--iterations", "3", "--device", "cpu")
 
 
 def test_what_bears_no_mark_is_known_by_the_manifest(
-    folder: Path, capsys: pytest.CaptureFixture[str], batch: Answers
+    folder: Path, capfd: pytest.CaptureFixture[str], batch: Answers
 ) -> None:
     """Also where a run was killed after the file was there and before that was noted."""
     arguments = ("batch", folder / "in" / "a.png", folder / "in" / "b.png", "-o", folder / "out", *SMALL)
@@ -168,14 +158,14 @@ def test_what_bears_no_mark_is_known_by_the_manifest(
     lines = notes.read_bytes().splitlines(keepends=True)
     assert [json.loads(line)["event"] for line in lines] == ["writing", "made"] * 2
     notes.write_bytes(b"".join(lines[:3]))
-    capsys.readouterr()
+    capfd.readouterr()
     images, totals = batch(*arguments, "--minify", "--curves", "40")
     assert (totals["skipped"], totals["made"]) == (2, 0)
     assert all(image["psnr"] > 5 for image in images)
     assert svgs == {path: path.read_bytes() for path in (folder / "out").glob("*.svg")}
     notes.unlink()
     assert run(*arguments, "--minify", "--curves", "40") == 2, "without it, they may be anybody's"
-    assert "--overwrite" in capsys.readouterr().err
+    assert "--overwrite" in capfd.readouterr().err
 
 
 def test_without_a_manifest_figures_are_those_of_the_files(folder: Path, batch: Answers) -> None:
@@ -189,14 +179,14 @@ def test_without_a_manifest_figures_are_those_of_the_files(folder: Path, batch: 
 
 
 def test_failures_are_tried_again_when_asked_or_changed(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     broken = folder / "in" / "broken.png"
     arguments = ("batch", broken, "-o", folder / "out", *SMALL, "--json")
 
     def tried(*more: str, code: int = 5) -> bool:
         assert run(*arguments, *more) == code
-        (image,), _ = answers(capsys.readouterr().out)
+        (image,), _ = answers(capfd.readouterr().out)
         return not image.get("before", False)
 
     assert tried()
@@ -210,25 +200,20 @@ def test_failures_are_tried_again_when_asked_or_changed(
     assert tried(code=0)
 
 
-def test_a_dry_run_writes_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dry_run_writes_nothing(folder: Path, cli: Cli) -> None:
     path = write(folder, "jobs: [{images: 'in/*.png', output: out, curves: 3, iterations: 3, device: cpu}]")
-    assert run("batch", path, "--dry-run") == 0
-    said = capsys.readouterr().out
+    said = cli("batch", path, "--dry-run").out
     assert f"{folder / 'out' / 'a.svg'}: would be made of {folder / 'in' / 'a.png'}" in said
     assert not (folder / "out").exists()
     assert run("batch", path, "-q") == 5
     before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
-    capsys.readouterr()
-    assert run("batch", path, "--dry-run", "--set", "seed=0") == 0
-    captured = capsys.readouterr()
+    captured = cli("batch", path, "--dry-run", "--set", "seed=0")
     assert "already made with these settings" in captured.out
     assert "broken.png: not an image" in captured.err
     assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before
 
 
-def test_several_images_of_vectorize(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_several_images_of_vectorize(folder: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     mask = ("--importance", "in/deep/c.png")
     assert run("vectorize", "in/a.png", "in/b.png", "-o", "out/", *mask, *SMALL) == 0
@@ -239,9 +224,7 @@ def test_several_images_of_vectorize(
         (("-",), "standard input"),
         (("--data-uri",), "one image"),
     ):
-        capsys.readouterr()
-        assert run("vectorize", "in/a.png", "in/b.png", *more) == 2
-        said = capsys.readouterr().err
+        said = cli("vectorize", "in/a.png", "in/b.png", *more, code=2).err
         assert words in said
         assert said.count("\n") == 1
     assert run("vectorize", "in/a.png", "in/broken.png", *SMALL) == 5

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.batch.helpers import load_jobs, write
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli
 from warpsplat.batch.layers import assigned, command_layer
 from warpsplat.batch.plan import BatchJob, home_of, in_shard, plan_jobs
 from warpsplat.errors import UsageError
@@ -170,6 +170,5 @@ def test_shards_are_parts_whatever_the_list(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "-1/3"])
-def test_what_is_no_shard(folder: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
-    assert run("batch", folder / "in", "--shard", text) == 2
-    assert "is not of the form I/N" in capsys.readouterr().err
+def test_what_is_no_shard(folder: Path, cli: Cli, text: str) -> None:
+    assert "is not of the form I/N" in cli("batch", folder / "in", "--shard", text, code=2).err

@@ -12,7 +12,7 @@ from PIL import Image
 
 import warpsplat.configs
 from tests.batch.helpers import load_jobs, write
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, run
 from tests.files.test_formats import PIXELS
 from tests.scenes import random_scene
 from warpsplat.batch.file import MAX_FILE
@@ -216,14 +216,11 @@ BAD = [
 
 
 @pytest.mark.parametrize(("text", "line", "word"), BAD)
-def test_errors_name_line_and_key(
-    folder: Path, capsys: pytest.CaptureFixture[str], text: str, line: int, word: str
-) -> None:
+def test_errors_name_line_and_key(folder: Path, cli: Cli, text: str, line: int, word: str) -> None:
     path = write(folder, text)
     (folder / "in" / "pic.svg").touch()
     before = sorted(os.listdir(folder / "in"))
-    assert run("batch", path) == 2
-    captured = capsys.readouterr()
+    captured = cli("batch", path, code=2)
     assert captured.err.startswith(f"warpsplat: {path}:{line}: "), captured.err
     assert word in captured.err
     assert captured.err.count("\n") == 1
@@ -289,31 +286,29 @@ jobs:
 
 
 def test_files_of_others_are_named_before_anything_starts(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capfd: pytest.CaptureFixture[str], cli: Cli
 ) -> None:
     drawn = "<svg xmlns='http://www.w3.org/2000/svg'/>"
     for name in ("in/a.svg", "in/b.svg"):
         (folder / name).write_text(drawn)
     path = write(folder, "jobs: [{images: 'in/**/[abc].png', curves: 3, iterations: 3, device: cpu}]")
-    assert run("batch", path) == 2
-    said = one_line(capsys.readouterr().err)
+    said = cli("batch", path, code=2).line
     assert all(words in said for words in ("2 results", "in/a.svg", "in/b.svg", "--overwrite"))
     assert (folder / "in/a.svg").read_text() == drawn
     assert not (folder / "in/deep/c.svg").exists()
     assert run("batch", path, "--overwrite") == 0
     assert run("batch", path) == 0, "our own may be replaced"
-    assert "3 skipped" in capsys.readouterr().out
+    assert "3 skipped" in capfd.readouterr().out
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
-def test_a_pipe_among_the_results_is_found_before(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_among_the_results_is_found_before(folder: Path, cli: Cli) -> None:
     os.mkfifo(folder / "in" / "a.svg")
-    assert run("batch", write(folder, "jobs:\n  - images: in/a.png\n")) == 2
-    assert "jobs.yaml:2: output: " in capsys.readouterr().err
+    assert "jobs.yaml:2: output: " in cli("batch", write(folder, "jobs:\n  - images: in/a.png\n"), code=2).err
 
 
 def test_a_result_folder_that_cannot_be_written_is_found_before(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
@@ -321,12 +316,10 @@ def test_a_result_folder_that_cannot_be_written_is_found_before(
     monkeypatch.setattr("warpsplat.files.output._temporary", refuse)
     path = write(folder, "defaults:\n  output: out\njobs:\n  - images: in/a.png\n")
     (folder / "out").mkdir()
-    assert run("batch", path) == 2
-    assert "jobs.yaml:2: output: cannot write to" in capsys.readouterr().err
+    assert "jobs.yaml:2: output: cannot write to" in cli("batch", path, code=2).err
     (folder / "out").rmdir()
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert run("batch", path) == 2
-    assert "jobs.yaml:2: output: " in capsys.readouterr().err
+    assert "jobs.yaml:2: output: " in cli("batch", path, code=2).err
     assert not (folder / "out").exists()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import warpsplat
 from tests.batch.helpers import load_jobs, write
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, run
 from warpsplat.batch.presets import FOLDER, load_preset, preset_names, with_preset
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
@@ -43,7 +43,7 @@ def test_options_beside_a_preset_count_more() -> None:
     assert closed.kind == Kind.FILL
 
 
-def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line(image: Path, tmp_path: Path, cli: Cli) -> None:
     """A name, and a file with a setting that only files have."""
     quick = ("--iterations", "12", "--device", "cpu", "--curves", "6", "-q")
     assert run("vectorize", image, "-o", tmp_path / "a.svg", "--preset", "low-poly", *quick) == 0
@@ -54,11 +54,11 @@ def test_the_command_line(image: Path, tmp_path: Path, capfd: pytest.CaptureFixt
     assert (tmp_path / "b.svg").read_text("utf-8").count("<circle") == 6
     assert run("batch", image, "-o", tmp_path / "e.svg", "--preset", own, "--shape", "triangle", *quick) == 0
     assert (tmp_path / "e.svg").read_text("utf-8").count("<polygon") == 6
-    assert run("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick) == 2
-    assert "known are: brush, embroidery" in one_line(capfd.readouterr().err)
+    said = cli("vectorize", image, "-o", tmp_path / "c.svg", "--preset", "nothing", *quick, code=2).line
+    assert "known are: brush, embroidery" in said
     own.write_text("shape: circle\ncurve: 99\n", "utf-8")
-    assert run("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick) == 2
-    assert "mine.yaml:2: unknown key 'curve'" in one_line(capfd.readouterr().err)
+    said = cli("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick, code=2).line
+    assert "mine.yaml:2: unknown key 'curve'" in said
 
 
 def test_batch_files_know_them(folder: Path) -> None:

@@ -32,18 +32,18 @@ def batch(*given: str) -> int:
 
 
 def test_a_batch_from_a_store_to_a_store(
-    store: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    store: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     store.pipe_file("/bucket/in/broken.png", b"no image")
     given = ("memory://bucket/in", "-o", "memory://bucket/out", "--json")
     assert batch(*given) == 5
-    assert "memory://bucket/in/broken.png: " in capsys.readouterr().err
+    assert "memory://bucket/in/broken.png: " in capfd.readouterr().err
     made = {f"/bucket/out/{name}.svg" for name in ("a", "b")}
     assert set(store.find("/bucket/out")) == made
     assert [path.name for path in tmp_path.iterdir()] == ["warpsplat-manifest.jsonl"], "nothing else is local"
     before = {name: store.cat_file(name) for name in made}
     assert batch(*given) == 5
-    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    rows = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
     assert {row["image"]: row["status"] for row in rows if "image" in row} == {
         "memory://bucket/in/a.png": "skipped",
         "memory://bucket/in/b.PNG": "skipped",
@@ -65,10 +65,10 @@ def test_the_bytes_of_a_local_batch(store: Any, tmp_path: Path) -> None:
     assert (tmp_path / "there/a.svg").read_bytes() == wanted
 
 
-def test_what_others_wrote_stays(store: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_others_wrote_stays(store: Any, capfd: pytest.CaptureFixture[str]) -> None:
     store.pipe_file("/bucket/out/a.svg", b"<svg>mine</svg>")
     assert batch("memory://bucket/in/a.png", "-o", "memory://bucket/out") == 2
-    assert "memory://bucket/out/a.svg" in capsys.readouterr().err
+    assert "memory://bucket/out/a.svg" in capfd.readouterr().err
     assert store.cat_file("/bucket/out/a.svg") == b"<svg>mine</svg>"
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -22,6 +25,27 @@ def run(*arguments: object) -> int:
     with pytest.raises(SystemExit) as caught:
         main([str(a) for a in arguments])
     return int(caught.value.code or 0)
+
+
+class Said(NamedTuple):
+    """What a command printed."""
+
+    out: str
+    err: str
+
+    @property
+    def line(self) -> str:
+        """The only line on the standard error."""
+        return one_line(self.err)
+
+    @property
+    def values(self) -> Any:
+        """The object of ``--json``."""
+        return json.loads(self.out)
+
+
+Cli = Callable[..., Said]
+"""The fixture ``cli``: runs the command line in this process, which must end with ``code``."""
 
 
 def one_line(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, Cli, run
 from warpsplat.fit.step import Step
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -38,18 +38,14 @@ def struck(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("struck")
 @pytest.mark.parametrize("command", ["vectorize", "refine"])
-def test_sigterm_leaves_a_checkpoint_and_the_next_run_goes_on(
-    command: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_sigterm_leaves_a_checkpoint_and_the_next_run_goes_on(command: str, cli: Cli) -> None:
     given: tuple[Any, ...] = ("vectorize", "photo.png", *RUN)
     if command == "refine":
         assert run("vectorize", "photo.png", "-o", "base.svg", *QUICK, "--iterations", 3) == 0
         given = ("refine", "base.svg", "photo.png", "--iterations", 12, "-q", "--checkpoint", "a.checkpoint")
     assert run(*given, "-o", "a.svg") == 143
     assert Path("a.checkpoint").exists() and Path("a.svg").exists()
-    capfd.readouterr()
-    assert run(*given, "-o", "a.svg") == 2
-    assert "a checkpoint exists; --resume continues from it" in one_line(capfd.readouterr().err)
+    assert "a checkpoint exists; --resume continues from it" in cli(*given, "-o", "a.svg", code=2).line
     assert run(*given, "-o", "a.svg", "--resume") == 0
     assert not Path("a.checkpoint").exists()
     assert run(*given, "-o", "b.svg", "--resume") == 0

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, Cli, one_line, run
 from warpsplat.errors import UsageError
 from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
@@ -62,12 +62,12 @@ def test_a_pdf_shows_what_the_svg_shows(tmp_path: Path) -> None:
 
 
 def test_vectorize_and_refine_write_what_the_name_says(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     paths = {ending: tmp_path / f"a{ending}" for ending in (".svg", ".svgz", ".PNG")}
     for path in paths.values():
         assert run("vectorize", image, "-o", path, *QUICK) == 0
-    assert "kB gzipped) as an SVG, " in capsys.readouterr().out.splitlines()[-1]
+    assert "kB gzipped) as an SVG, " in capfd.readouterr().out.splitlines()[-1]
     text = paths[".svg"].read_text()
     assert gzip.decompress(paths[".svgz"].read_bytes()).decode() == text
     with Image.open(paths[".PNG"]) as png:
@@ -81,14 +81,14 @@ def test_vectorize_and_refine_write_what_the_name_says(
 
 
 def test_a_missing_package_is_named_before_any_work(
-    image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    image: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     for extra, package in (("pdf", "typst"), ("dxf", "ezdxf")):
         path = image.parent / f"a.{extra}"
         assert run("vectorize", image, "-o", path, *QUICK) == 2
         message = f"pip install {package}, or warpsplat with its extra: '.[{extra}]'"
-        assert message in one_line(capsys.readouterr().err)
+        assert message in one_line(capfd.readouterr().err)
         with pytest.raises(UsageError, match=f"pip install {package}"):
             write_named(path, SVG)
         assert not path.exists()
@@ -124,10 +124,8 @@ def test_how_curves_are_written(image: Path, tmp_path: Path) -> None:
     assert b"AC1009" in made[0] and b"AC1018" in made[2]
 
 
-def test_what_is_no_path_is_refused_before_any_work(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_path_is_refused_before_any_work(image: Path, tmp_path: Path, cli: Cli) -> None:
     svg = tmp_path / "a.svg"
     svg.write_text(PATHS.replace("</svg>", "<text>a</text></svg>"))
-    assert run("refine", svg, image, "--keep", "-o", tmp_path / "b.eps", "--iterations", 3) == 3
-    assert "<text>" in one_line(capsys.readouterr().err)
+    said = cli("refine", svg, image, "--keep", "-o", tmp_path / "b.eps", "--iterations", 3, code=3).line
+    assert "<text>" in said

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli, run
 from warpsplat.cli.help import GroupedCommand
 from warpsplat.cli.main import COMMANDS, cli
 from warpsplat.svg.page import MILLIMETRES, PAGES
@@ -15,13 +15,13 @@ MANY = ("vectorize", "refine", "batch")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help(name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help(name: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many options, twelve or so are explained, all are named, and ``--help-all`` explains each once."""
     monkeypatch.setenv("COLUMNS", "80")
     texts = []
     for flag in ("--help", "--help-all") if name in MANY else ("--help",):
         assert run(name, flag) == 0
-        texts.append(capsys.readouterr().out)
+        texts.append(capfd.readouterr().out)
         assert max(map(len, texts[-1].splitlines())) < 80
     command = cli.get_command(click.Context(cli), name)
     assert command
@@ -58,17 +58,15 @@ COMPLETED = {
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_completion(shell: str, monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_source")
-    assert run() == 0
-    assert "_warpsplat_completion" in capsys.readouterr().out
+    assert "_warpsplat_completion" in cli().out
     monkeypatch.setenv("_WARPSPLAT_COMPLETE", f"{shell}_complete")
     for line, wanted in COMPLETED.items():
         words = f"warpsplat {line}".split(" ")
         monkeypatch.setenv("COMP_WORDS", f"warpsplat {line}")
         monkeypatch.setenv("COMP_CWORD", words[-1] if shell == "fish" else f"{len(words) - 1}")
-        assert run() == 0
-        lines = capsys.readouterr().out.splitlines()
+        lines = cli().out.splitlines()
         rows = [line.split("\t")[0].split(",") for line in lines]
         found = rows if shell != "zsh" else [[a, b] for [a], [b] in zip(rows[::3], rows[1::3], strict=True)]
         assert {value if kind == "plain" else kind for kind, value in found} == wanted

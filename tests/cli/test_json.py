@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import MANIFEST, QUICK, run
+from tests.cli.helpers import MANIFEST, QUICK, Cli, run
 
 
 @pytest.fixture(autouse=True)
@@ -23,16 +23,16 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def printed(capsys: pytest.CaptureFixture[str]) -> Any:
+def printed(capfd: pytest.CaptureFixture[str]) -> Any:
     def printed(*words: object) -> Any:
-        capsys.readouterr()
+        capfd.readouterr()
         assert run(*words, "--json") == 0
-        return json.loads(capsys.readouterr().out.splitlines()[0], parse_constant=pytest.fail)
+        return json.loads(capfd.readouterr().out.splitlines()[0], parse_constant=pytest.fail)
 
     return printed
 
 
-def test_an_exact_file(printed: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_exact_file(printed: Any, cli: Cli) -> None:
     assert run("vectorize", "cells.png", "--subject", "pixel") == 0
     found = [
         printed("vectorize", "cells.png", "--subject", "pixel"),
@@ -46,9 +46,7 @@ def test_an_exact_file(printed: Any, capsys: pytest.CaptureFixture[str]) -> None
     assert made["exact"] is False and made["psnr"] > 5
     again = printed("refine", "cells.svg", "cells.png", "-o", "b.svg", "--iterations", 1, "--device", "cpu")
     assert (again["psnr_before"], again["psnr"], again["exact"]) == (None, None, True)
-    capsys.readouterr()
-    assert run("eval", "cells.png", "cells.svg") == 0
-    assert capsys.readouterr().out.splitlines()[0].split() == ["psnr", "exact"]
+    assert cli("eval", "cells.png", "cells.svg").out.splitlines()[0].split() == ["psnr", "exact"]
 
 
 @pytest.mark.parametrize("command", ["vectorize", "refine", "several", "batch"])

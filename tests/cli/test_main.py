@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, Cli, one_line
 from tests.forks import CLOSED, Forks
 from warpsplat.cli.main import COMMANDS, json_stream, report_error
 from warpsplat.errors import CapacityError
@@ -115,44 +115,39 @@ def test_whatever_is_raised_is_one_line_and_a_code(
     code: int,
     words: str,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(type(error)):
         raise error  # which gives it a traceback
     assert report_error(error) == code
-    assert words in one_line(capsys.readouterr().err)
+    assert words in one_line(capfd.readouterr().err)
     monkeypatch.setenv("WARPSPLAT_TRACEBACK", "1")
     assert report_error(error) == code
-    assert "Traceback" in capsys.readouterr().err
+    assert "Traceback" in capfd.readouterr().err
 
 
-def test_a_reader_that_has_gone(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_reader_that_has_gone(monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     def write(text: str, *, err: bool) -> None:
         if not err:
             raise BrokenPipeError
         print(text, file=sys.stderr)
 
     monkeypatch.setattr("warpsplat.cli.echo.click.echo", write)
-    assert run("info") == 4
-    assert "standard output: closed by its reader" in one_line(capsys.readouterr().err)
+    assert "standard output: closed by its reader" in cli("info", code=4).line
 
 
 def test_an_image_without_a_command_is_vectorized(
-    image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(image.name, *QUICK) == 0
-    captured = capsys.readouterr()
+    captured = cli(image.name, *QUICK)
     assert captured.out.startswith("photo.svg: ")
     assert "no command given, so it is vectorized (warpsplat vectorize photo.png)" in captured.err
     assert (tmp_path / "photo.svg").exists()
 
 
-def test_objects_keep_out_of_the_way_of_a_file(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("vectorize", "missing.png", "-o", "-", "--json") == 3
-    captured = capsys.readouterr()
+def test_objects_keep_out_of_the_way_of_a_file(monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
+    captured = cli("vectorize", "missing.png", "-o", "-", "--json", code=3)
     assert captured.out == ""
     line, found = captured.err.splitlines()
     assert line == f"warpsplat: {json.loads(found)['error']}"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line, run
 from tests.fuzz.corpus import own_svg
 from tests.svg.foreign import FOREIGN, HEAD
 
@@ -38,25 +38,21 @@ def test_outputs_and_standard_streams(
 KEPT = '<filter id="f"><feOffset dx="1"/></filter><path d="M5 5h20v9z" filter="url(#f)"/>'
 
 
-def test_kept_elements_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kept_elements_are_named(tmp_path: Path, cli: Cli) -> None:
     svg, image, output = tmp_path / "a.svg", tmp_path / "a.png", tmp_path / "b.svg"
     svg.write_text(f'{HEAD}width="40" height="30"><path d="M2 2h30v20z" fill="red"/>{KEPT}</svg>')
     Image.new("RGB", (40, 30), "grey").save(image)
     arguments = ("refine", svg, image, "-o", output, "--iterations", "5", "--device", "cpu")
-    assert run(*arguments) == 3
-    assert "filter" in one_line(capsys.readouterr().err)
-    assert run(*arguments, "--keep", "--json") == 0
-    captured = capsys.readouterr()
+    assert "filter" in cli(*arguments, code=3).line
+    captured = cli(*arguments, "--keep", "--json")
     values = json.loads(captured.out)
     assert values["psnr"] > values["psnr_before"]
     assert values["kept"] == "<path> (filter)"
     assert one_line(captured.err).endswith("a.svg: kept as it is: <path> (filter)")
     assert KEPT.partition("</filter>")[2] in output.read_text()
-    assert run(*arguments, "--keep", "-q") == 0
-    assert capsys.readouterr().err == ""
+    assert cli(*arguments, "--keep", "-q").err == ""
     svg.write_text(f'{HEAD}width="40" height="30">{KEPT}</svg>')
-    assert run(*arguments, "--keep") == 3
-    assert "contains no path to refine: <path> (filter)" in one_line(capsys.readouterr().err)
+    assert "contains no path to refine: <path> (filter)" in cli(*arguments, "--keep", code=3).line
 
 
 def test_a_name_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

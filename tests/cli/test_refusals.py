@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line
 from tests.fuzz.corpus import own_svg
 from warpsplat.cli.main import COMMANDS
 
@@ -240,23 +240,16 @@ def contents(folder: Path) -> dict[str, bytes]:
     ("code", "line", "words"), [*((2, *row) for row in USAGE), *((3, *row) for row in INPUT)]
 )
 def test_refusals(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    code: int,
-    line: str,
-    words: str,
+    folder: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli, code: int, line: str, words: str
 ) -> None:
     monkeypatch.chdir(folder)
     before, arguments = contents(folder), shlex.split(line)
-    assert run(*arguments) == code
-    shown = capsys.readouterr()
+    shown = cli(*arguments, code=code)
     said = one_line(shown.err)
     assert said.startswith("warpsplat: ") and words in said
     assert shown.out == ""
     if arguments[0] not in WITHOUT_JSON and " -o -" not in line and "data-uri" not in line:
-        assert run(*arguments, "--json") == code
-        shown = capsys.readouterr()
+        shown = cli(*arguments, "--json", code=code)
         assert one_line(shown.err) == said
         assert json.loads(shown.out) == {"error": said.removeprefix("warpsplat: "), "exit_code": code}
     assert contents(folder) == before
@@ -267,14 +260,12 @@ def test_every_command_is_refused_something() -> None:
 
 
 @pytest.mark.parametrize("option", ["--curves", "--seed", "--quality", "--background", "--levels", "--size"])
-def test_a_refused_value_is_shown_by_its_beginning(option: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("vectorize", "a.png", option, 5000 * "9") == 2
-    said = one_line(capsys.readouterr().err)
+def test_a_refused_value_is_shown_by_its_beginning(option: str, cli: Cli) -> None:
+    said = cli("vectorize", "a.png", option, 5000 * "9", code=2).line
     assert 70 * "9" in said and 90 * "9" not in said
 
 
 @pytest.mark.parametrize("option", ["--background", "--palette"])
-def test_a_colour_that_the_shell_took_for_a_comment(option: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("vectorize", "a.png", option) == 2
-    said = one_line(capsys.readouterr().err)
+def test_a_colour_that_the_shell_took_for_a_comment(option: str, cli: Cli) -> None:
+    said = cli("vectorize", "a.png", option, code=2).line
     assert f"'{option}' requires an argument; write it in quotes" in said

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, run
+from tests.cli.helpers import QUICK, Cli, run
 from tests.fuzz.corpus import own_svg
 from tests.svg.foreign import HEAD, PATH, SMALL
 from warpsplat.metrics import psnr
 
 
-def test_render(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_render(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     svg, png = tmp_path / "a.svg", tmp_path / "a.png"
     assert run("vectorize", image, "-o", svg, "-q", *QUICK) == 0
     assert run("render", svg, "-o", png, "--scale", "2.5", "-q") == 0
     with Image.open(png) as picture:
         assert picture.size == (150, 100)
-    assert capsys.readouterr() == ("", "")
+    assert capfd.readouterr() == ("", "")
 
 
 SHAPES = (
@@ -99,14 +99,10 @@ def test_standard_streams(
     assert run("eval", "-", "-") == 2
 
 
-def test_a_name_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     """Without -o a PNG here, and one line about it, which -q leaves out."""
     monkeypatch.chdir(tmp_path)
     Path("in").mkdir()
     Path("in/a.svg").write_bytes(own_svg("fill"))
-    assert run("render", "in/a.svg") == 0
-    assert capsys.readouterr().out == f"a.png: {Path('a.png').stat().st_size / 1000:.1f} kB\n"
-    assert run("render", "in/a.svg", "-q") == 0
-    assert capsys.readouterr().out == ""
+    assert cli("render", "in/a.svg").out == f"a.png: {Path('a.png').stat().st_size / 1000:.1f} kB\n"
+    assert cli("render", "in/a.svg", "-q").out == ""

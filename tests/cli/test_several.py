@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli, run
 from warpsplat.cli.main import main
 from warpsplat.fit.settings import PRESETS
 from warpsplat.run.suggest import Expected, Suggestion, choose
@@ -22,12 +22,11 @@ FEW = ["--iterations", "12", "--device", "cpu", "--threads", "1"]
 
 
 def test_a_file_for_each_number(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Short runs do not continue from each other: the files are those of single runs."""
     monkeypatch.chdir(tmp_path)
-    assert run("vectorize", image, "--curves", "9,3", "--report", "both.html", *FEW) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = cli("vectorize", image, "--curves", "9,3", "--report", "both.html", *FEW).out.splitlines()
     assert lines[0].split() == ["shapes", "dB", "SSIM", "kB", "gzip", "kB", "seconds"]
     assert [line.split()[:2] for line in lines[1:]] == [["photo-9.svg", "9"], ["photo-3.svg", "3"]]
     page = Path("both.html").read_text()
@@ -46,17 +45,11 @@ def test_a_file_for_each_number(
     ],
 )
 def test_names(
-    image: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    output: str,
-    names: set[str],
+    image: Path, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch, output: str, names: set[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     quick = ["--iterations", "1", "--device", "cpu"]
-    assert run("vectorize", image, "--curves", "2,5", "-o", output, "--json", *quick) == 0
-    values = json.loads(capsys.readouterr().out)
+    values = cli("vectorize", image, "--curves", "2,5", "-o", output, "--json", *quick).values
     assert [one["shapes"] for one in values] == [2, 5]
     assert {one["output"] for one in values} == names and all(map(os.path.isfile, names))
 
@@ -75,13 +68,13 @@ def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> No
 
 
 def test_files_are_named_after_their_numbers_where_it_is_interrupted(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Files of few shapes are made first, in whichever order the numbers are given."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("warpsplat.cli.run.Interrupt.__call__", lambda self: os.path.exists("photo-3.svg"))
     run("vectorize", image, "--curves", "9,3,6", *FEW)
-    _, row, last = capsys.readouterr().out.splitlines()
+    _, row, last = capfd.readouterr().out.splitlines()
     assert row.split()[:2] == ["photo-3.svg", "3"]
     assert last == "interrupted: no file for --curves 9, 6"
     assert {path.name for path in tmp_path.glob("*.svg")} == {"photo-3.svg"}
@@ -123,10 +116,9 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("quickly")
-def test_a_suggestion(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_suggestion(image: Path, cli: Cli) -> None:
     before = os.listdir(image.parent)
-    assert run("vectorize", image, "--suggest", "--open", "--json", "--device", "cpu") == 0
-    values = json.loads(capsys.readouterr().out)
+    values = cli("vectorize", image, "--suggest", "--open", "--json", "--device", "cpu").values
     drafts = values["expected"]
     assert [one["shapes"] for one in drafts] == [16 * 2**i for i in range(len(drafts))]
     assert [one["bytes"] for one in drafts] == sorted(one["bytes"] for one in drafts)
@@ -146,14 +138,14 @@ def series(*figures: tuple[int, float, int]) -> tuple[Expected, ...]:
 
 
 def test_a_suggestion_in_words(
-    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drafts = series((64, 25.0, 7_000), (128, 26.0, 14_000), (256, 26.5, 28_000))
     made = Suggestion(128, "photo", choose(drafts)[1], drafts, 1.0)
     monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: made)
     with pytest.raises(SystemExit):
         main(["vectorize", str(image), "--suggest"])
-    lines = capsys.readouterr().out.splitlines()
+    lines = capfd.readouterr().out.splitlines()
     assert lines[0] == f"{image}: 128 shapes"
     assert lines[2].endswith("+1.0 dB for 7 kB more") and lines[3].startswith("  ->   128   26.0    14.0")
     assert lines[-1].strip() == f"warpsplat vectorize {image} --curves 128 -o photo.svg"
@@ -177,20 +169,16 @@ def test_more_shapes_than_are_worth_it_are_not_suggested(
     assert chosen == curves and words in why
 
 
-def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, cli: Cli) -> None:
     path = tmp_path / "cells.png"
     Image.fromarray(np.kron(np.eye(8, dtype=np.uint8) * 255, np.ones((4, 4), np.uint8))).save(path)
-    assert run("vectorize", path, "--suggest") == 0
-    said = capsys.readouterr().out
+    said = cli("vectorize", path, "--suggest").out
     assert "A piece of pixel art (2 colours in cells of 4x4 px), which is traced" in said
     assert "the picture says how many shapes there are. --subject photo fits a number of shapes" in said
 
 
-def test_an_interrupted_suggestion_says_so(
-    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_suggestion_says_so(image: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpsplat.run.suggest.suggest", lambda *a, **k: None)
-    assert run("vectorize", image, "--suggest", "--json") == 130
-    said = capsys.readouterr()
+    said = cli("vectorize", image, "--suggest", "--json", code=130)
     assert json.loads(said.out) == {"error": "interrupted", "exit_code": 130}
     assert "warpsplat: interrupted" in said.err

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import warpsplat
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, Cli, run
 from tests.files.memory_store import png, store  # noqa: F401
 from tests.fuzz.corpus import own_svg
-from warpsplat.errors import UsageError
 
 URL = "https://example.org/a.png"
 
@@ -31,17 +28,6 @@ COMMANDS = [
     ("batch", URL),
 ]
 
-CALLS: list[Callable[[], object]] = [
-    lambda: warpsplat.vectorize(URL),
-    lambda: warpsplat.vectorize_several(URL, [4, 8]),
-    lambda: warpsplat.suggest(URL),
-    lambda: warpsplat.refine(URL, URL),
-    lambda: warpsplat.score("<svg/>", URL),
-    lambda: warpsplat.render(URL),
-    lambda: warpsplat.load_svg(URL),
-    lambda: warpsplat.load_image(URL),
-]
-
 
 @pytest.fixture
 def without_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -56,24 +42,14 @@ MESSAGE = f"{URL}: URLs need: pip install 'warpsplat[remote]'"
 
 @pytest.mark.usefixtures("without_package")
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
-def test_commands_name_the_extra(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(*words) == 2
-    assert MESSAGE in capsys.readouterr().err.splitlines()[-1]
+def test_commands_name_the_extra(words: tuple[str, ...], cli: Cli) -> None:
+    assert MESSAGE in cli(*words, code=2).err.splitlines()[-1]
 
 
-@pytest.mark.usefixtures("without_package")
-@pytest.mark.parametrize("call", CALLS)
-def test_functions_name_the_extra(call: Callable[[], object]) -> None:
-    with pytest.raises(UsageError) as caught:
-        call()
-    assert str(caught.value) == MESSAGE
-
-
-def test_commands_read_urls(store: Any, capsys: pytest.CaptureFixture[str]) -> None:  # noqa: F811
+def test_commands_read_urls(store: Any, cli: Cli) -> None:  # noqa: F811
     store.pipe_file("/bucket/in/drawing.svg", own_svg("fill"))
     image, svg = "memory://bucket/in/a.png", "memory://bucket/in/drawing.svg"
-    assert run("vectorize", image, *QUICK, "--importance", image, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["image"] == image
+    assert cli("vectorize", image, *QUICK, "--importance", image, "--json").values["image"] == image
     assert Path("a.svg").exists(), "in the current folder"
     assert run("refine", svg, image, "-o", "b.svg", "--iterations", 2, "--device", "cpu") == 0
     assert run("eval", image, svg, "--report", "eval.html") == 0
@@ -84,9 +60,9 @@ def test_commands_read_urls(store: Any, capsys: pytest.CaptureFixture[str]) -> N
 
 @pytest.mark.usefixtures("store")
 @pytest.mark.parametrize("option", ["-o", "--checkpoint", "--report", "--animate"])
-def test_single_results_stay_here(option: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("vectorize", "memory://bucket/in/a.png", option, "s3://bucket/a.svg") == 2
-    assert "s3://bucket/a.svg: only warpsplat batch writes to URLs" in one_line(capsys.readouterr().err)
+def test_single_results_stay_here(option: str, cli: Cli) -> None:
+    said = cli("vectorize", "memory://bucket/in/a.png", option, "s3://bucket/a.svg", code=2).line
+    assert "s3://bucket/a.svg: only warpsplat batch writes to URLs" in said
 
 
 def test_a_result_is_saved_to_a_url(store: Any) -> None:  # noqa: F811

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.cli.helpers import QUICK, one_line, run, shell
+from tests.cli.helpers import QUICK, Cli, one_line, run, shell
 from tests.drawing.trace.drawings import LOGO, draw, ground
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
@@ -22,10 +22,9 @@ from warpsplat.svg.write import minified
 
 
 @pytest.mark.parametrize("kind", ["--closed", "--open"])
-def test_vectorize(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
+def test_vectorize(image: Path, tmp_path: Path, cli: Cli, kind: str) -> None:
     output = tmp_path / "out.svg"
-    assert run("vectorize", image, "-o", output, kind, "--json", *QUICK) == 0
-    values = json.loads(capsys.readouterr().out)
+    values = cli("vectorize", image, "-o", output, kind, "--json", *QUICK).values
     assert values["paths"] == 8
     assert values["bytes"] == output.stat().st_size
     shown = on_white(render_svg(output.read_text()))
@@ -33,25 +32,25 @@ def test_vectorize(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_summary_and_default_output(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("vectorize", image, *QUICK) == 0
     assert (tmp_path / "photo.svg").exists()
-    captured = capsys.readouterr()
+    captured = capfd.readouterr()
     assert re.fullmatch(
         r"photo\.svg: \d+\.\d\d dB, SSIM 0\.\d{3}(, SSIMULACRA2 -?[\d.]+)?, 8 paths, .* s\n", captured.out
     )
     assert captured.err == "", "no progress bar where stderr is no terminal"
 
 
-def test_what_only_the_work_finds_out_names_the_image(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_only_the_work_finds_out_names_the_image(tmp_path: Path, cli: Cli) -> None:
     path = tmp_path / "white.png"
     Image.fromarray(np.full((40, 40, 3), 255, np.uint8)).save(path)
-    assert run("vectorize", path, "--subject", "line", "-o", tmp_path / "a.svg", "--device", "cpu") == 3
-    assert f"{path}: no lines found" in one_line(capsys.readouterr().err)
+    said = cli(
+        "vectorize", path, "--subject", "line", "-o", tmp_path / "a.svg", "--device", "cpu", code=3
+    ).line
+    assert f"{path}: no lines found" in said
     with pytest.raises(ImageError, match=r"^mine: no lines found"):
         warpsplat.vectorize(path.read_bytes(), subject="line", name="mine", device="cpu")
 
@@ -76,7 +75,7 @@ def test_standard_input_and_output(image: Path) -> None:
     assert not os.path.exists("-")
 
 
-def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_importance(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     output, path = tmp_path / "a.svg", tmp_path / "mask.png"
 
     def made(mask: Image.Image) -> str:
@@ -92,7 +91,7 @@ def test_importance(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     half.resize((20, 30)).save(path)
     assert run("vectorize", image, "-o", output, "-q", *QUICK, "--importance", path) == 3
     message = "mask.png: 20x30 pixels; a mask must have the proportions of its 60x40 image"
-    assert message in one_line(capsys.readouterr().err)
+    assert message in one_line(capfd.readouterr().err)
 
 
 def test_title_and_minify(image: Path, tmp_path: Path) -> None:
@@ -107,10 +106,9 @@ def test_title_and_minify(image: Path, tmp_path: Path) -> None:
     assert run("vectorize", image, *given, "--minify", "--overwrite") == 0
 
 
-def test_data_uri(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_data_uri(image: Path, tmp_path: Path, cli: Cli) -> None:
     output = tmp_path / "a.svg"
-    assert run("vectorize", image, "-o", output, *QUICK, "--data-uri") == 0
-    shown = capsys.readouterr()
+    shown = cli("vectorize", image, "-o", output, *QUICK, "--data-uri")
     assert shown.out.strip() == data_uri(output.read_text())
     assert "dB" in shown.err
 
@@ -123,12 +121,11 @@ def test_data_uri(image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
     ],
 )
 def test_a_line_says_what_an_option_does_to_a_drawing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str
+    tmp_path: Path, cli: Cli, options: list[str], said: str
 ) -> None:
     path = tmp_path / "logo.png"
     Image.fromarray(np.round(255 * draw(ground("#fff") + LOGO)[..., :3]).astype(np.uint8)).save(path)
-    assert (
-        run("vectorize", path, "-o", tmp_path / "a.svg", *options, "--quality", "draft", "--curves", "8") == 0
-    )
-    lines = capsys.readouterr().err.splitlines()
+    lines = cli(
+        "vectorize", path, "-o", tmp_path / "a.svg", *options, "--quality", "draft", "--curves", "8"
+    ).err.splitlines()
     assert [said in line for line in lines].count(True) == 1

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line, run
 from tests.compare.tracers import bands, stub
 from warpsplat.compare.tracer import TRACERS, TracerOptions
 
@@ -24,34 +24,30 @@ def use(monkeypatch: pytest.MonkeyPatch, trace: Callable[[bytes, TracerOptions],
 
 
 def test_a_comparison_and_its_files(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Figures are those of eval; existing files are only replaced with --overwrite."""
     use(monkeypatch)
     folder = tmp_path / "new" / "folder"
-    assert run("compare", image, *QUICK, "-o", folder, "--json") == 0
-    results = json.loads(capsys.readouterr().out)["results"]
+    results = cli("compare", image, *QUICK, "-o", folder, "--json").values["results"]
     names = [f"{r['program'].lower()}-{r['setting']}" for r in results]
     assert names == ["warpsplat-4", "warpsplat-8", "bands-one", "bands-four"]
     files = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert set(files) == REPORTS | {f"photo.{name}.svg" for name in names}
     for name, result in zip(names, results, strict=True):
-        assert run("eval", image, folder / f"photo.{name}.svg", "--json") == 0
-        seen = json.loads(capsys.readouterr().out)
+        seen = cli("eval", image, folder / f"photo.{name}.svg", "--json").values
         assert all(result[k] == seen[k] for k in ("psnr", "ssim", "paths", "nodes", "bytes", "gzip_bytes"))
     assert json.loads(files["comparison.json"])["results"] == results
 
-    assert run("compare", image, *QUICK, "-o", folder) == 2
-    assert "--overwrite replaces it" in one_line(capsys.readouterr().err)
+    assert "--overwrite replaces it" in cli("compare", image, *QUICK, "-o", folder, code=2).line
     assert files == {path.name: path.read_bytes() for path in folder.iterdir()}
-    assert run("compare", image, *QUICK, "-o", folder, "--overwrite", "--seed", "1") == 0
-    assert capsys.readouterr().out == (folder / "comparison.md").read_text()
+    said = cli("compare", image, *QUICK, "-o", folder, "--overwrite", "--seed", "1").out
+    assert said == (folder / "comparison.md").read_text()
     assert "seed 1" in (folder / "comparison.md").read_text()
 
 
-def test_a_comparison_with_vtracer(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("compare", image, *QUICK) == 0
-    captured = capsys.readouterr()
+def test_a_comparison_with_vtracer(image: Path, cli: Cli) -> None:
+    captured = cli("compare", image, *QUICK)
     rows = [[cell.strip() for cell in line.split("|")] for line in captured.out.splitlines()]
     assert [row[2] for row in rows if row[1:2] == ["warpsplat"]] == ["4", "8"]
     assert "default" in [row[2] for row in rows if row[1:2] == ["VTracer"]]
@@ -59,7 +55,7 @@ def test_a_comparison_with_vtracer(image: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_several_images_and_one_failure(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def trace(png: bytes, options: TracerOptions) -> str:
         if options["bands"] == 4:
@@ -69,15 +65,14 @@ def test_several_images_and_one_failure(
     use(monkeypatch, trace)
     other = tmp_path / "other.png"
     Image.new("RGB", (30, 20), "teal").save(other)
-    assert run("compare", image, other, *QUICK, "-o", tmp_path / "out") == 0
-    text = capsys.readouterr().out
+    text = cli("compare", image, other, *QUICK, "-o", tmp_path / "out").out
     assert text.count("Bands, four: failed: ValueError: no more than three") == 2
     assert "## Mean of 2 images" in text
     assert not list((tmp_path / "out").glob("*four*"))
 
 
 def test_an_interruption_publishes_the_rows_so_far(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    image: Path, tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def trace(png: bytes, options: TracerOptions) -> str:
         if options["bands"] == 4:
@@ -85,24 +80,20 @@ def test_an_interruption_publishes_the_rows_so_far(
         return bands(png, options)
 
     use(monkeypatch, trace)
-    assert run("compare", image, *QUICK, "-o", tmp_path / "out") == 130
-    captured = capsys.readouterr()
+    captured = cli("compare", image, *QUICK, "-o", tmp_path / "out", code=130)
     assert one_line(captured.err) == "warpsplat: interrupted" and "| Bands " in captured.out
     results = json.loads((tmp_path / "out" / "comparison.json").read_text())["results"]
     assert [result["setting"] for result in results] == ["4", "8", "one"]
     monkeypatch.setattr("warpsplat.cli.signals.Interrupt.__call__", lambda self: True)
-    assert run("compare", image, *QUICK, "-o", tmp_path / "none") == 130
-    captured = capsys.readouterr()
+    captured = cli("compare", image, *QUICK, "-o", tmp_path / "none", code=130)
     assert one_line(captured.err) == "warpsplat: interrupted" and captured.out == ""
     assert not list((tmp_path / "none").iterdir()), "a run that was cut short is no result"
 
 
-def test_vtracer_may_be_missing(
-    image: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_vtracer_may_be_missing(image: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "vtracer", None)
-    assert run("compare", image, *QUICK) == 2
-    assert "needs vtracer, which is not installed: pip install vtracer" in one_line(capsys.readouterr().err)
+    said = cli("compare", image, *QUICK, code=2).line
+    assert "needs vtracer, which is not installed: pip install vtracer" in said
 
 
 def test_drawings_are_traced_as_vectorize_does(tmp_path: Path) -> None:
@@ -135,12 +126,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("arguments", "code", "words"), WRONG)
 def test_wrong_requests_are_one_line_before_any_work(
-    image: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    code: int,
-    words: str,
+    image: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, words: str
 ) -> None:
     use(monkeypatch)
     monkeypatch.chdir(image.parent)
@@ -148,7 +134,6 @@ def test_wrong_requests_are_one_line_before_any_work(
     Path("text.png").write_text("no image")
     Image.new("RGB", (9, 9)).save("photo.jpg")
     before = set(Path().iterdir())
-    assert run("compare", *arguments) == code
-    captured = capsys.readouterr()
+    captured = cli("compare", *arguments, code=code)
     assert words in one_line(captured.err)
     assert captured.out == "" and set(Path().iterdir()) == before

@@ -15,14 +15,12 @@ from PIL import Image
 from tests.compare.tracers import SIZES, bands, stub
 from tests.fit.pictures import picture
 from tests.runs import vectorize
-from warpsplat.compare.comparison import OURS, compare, warm_up
+from warpsplat.compare.comparison import OURS, compare
 from warpsplat.compare.tracer import VTRACER_SETTINGS, TracerOptions, vtracer
 from warpsplat.files.sources import image_of
-from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.prepare import PreparedImage
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
 
@@ -94,19 +92,6 @@ def test_a_file_that_cannot_be_rendered() -> None:
     rows = list(compare("a.png", picture(), [], stub(lambda png, options: "no SVG"), run))
     assert all(row.svg == "no SVG" and row.score is None for row in rows)
     assert all(row.error.startswith("its file: not ") or "well-formed" in row.error for row in rows)
-
-
-def test_warm_up_loads_what_a_run_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Settings] = []
-
-    def note(image: PreparedImage, run: Run) -> None:
-        made.append(image.problem.settings)
-
-    monkeypatch.setattr("warpsplat.compare.comparison.make_result", note)
-    asked = make_settings(curves=100_000, iterations=1_000_000, renderer="splat")
-    warm_up(asked, Backend.on("cpu"))
-    assert (made[0].kind, made[0].renderer) == (asked.kind, asked.renderer)
-    assert made[0].curves < 100 and made[0].iterations < 100
 
 
 def test_vtracer_takes_all_of_its_settings() -> None:

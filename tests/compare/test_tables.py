@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from tests.compare.tracers import stub
 from warpsplat.compare.comparison import OURS, Comparison, ComparisonRow
-from warpsplat.compare.tables import markdown, means, table
+from warpsplat.compare.tables import markdown, means
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import Score
 
@@ -22,20 +22,6 @@ def row(image: str, program: str = OURS, setting: str = "8", score: Score | None
 
 def comparison(*rows: ComparisonRow) -> Comparison:
     return Comparison(rows, make_settings(curves=8, iterations=12, seed=3), stub())
-
-
-def cells(text: str) -> list[list[str]]:
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
-
-
-def test_a_table_has_the_figures_under_their_headings() -> None:
-    text = table([(OURS, "8", {"psnr": 28.125, "bytes": 1234, "paths": 8}), ("Bands", "one", {"psnr": 9.0})])
-    assert len({len(line) for line in text.splitlines()}) == 1, "columns of one width"
-    heads, rule, *lines = cells(text)
-    assert heads == ["program", "setting", "PSNR [dB]", "kB", "paths"]
-    assert all(set(dashes) <= {"-", ":"} for dashes in rule)
-    assert lines == [[OURS, "8", "28.12", "1.2", "8"], ["Bands", "one", "9.00", "-", "-"]]
-    assert "exact" in table([(OURS, "8", {"psnr": math.inf})])
 
 
 def test_means_are_of_settings_that_all_images_have() -> None:

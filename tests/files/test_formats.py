@@ -13,7 +13,7 @@ from PIL import EpsImagePlugin, Image, ImageFile
 
 import warpsplat
 from tests import ROOT
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli
 from tests.files.samples import load_image
 from warpsplat.errors import ExitCode, ImageError
 from warpsplat.files.image import FORMATS, image_facts
@@ -48,12 +48,12 @@ def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_postscript_is_run_by_nothing_that_reads_images(
-    tmp_path: Path, programs: list[str], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, programs: list[str], cli: Cli
 ) -> None:
     path = tmp_path / "x.png"
     path.write_bytes(ENDLESS)
-    assert run("vectorize", path, "-o", tmp_path / "x.svg") == ExitCode.INPUT
-    assert "x.png: not an image of a format that is read: AVIF, BMP, " in one_line(capsys.readouterr().err)
+    said = cli("vectorize", path, "-o", tmp_path / "x.svg", code=ExitCode.INPUT).line
+    assert "x.png: not an image of a format that is read: AVIF, BMP, " in said
     names = ", ".join(sorted([*FORMATS, *(plugin.format for plugin in PLUGINS)]))
     message = rf"x\.png: not an image of a format that is read: {names}$"
     for read in (

@@ -9,17 +9,17 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, run
 from warpsplat.fit.settings import Subject
 from warpsplat.inkscape import command
 from warpsplat.inkscape.command import FILES, SCRIPT, SOURCE
 
 
-def test_it_is_installed_and_removed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_is_installed_and_removed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "new" / "extensions"
     for _ in range(2):
         assert run("inkscape", "--folder", folder) == 0
-    assert str(folder) in capsys.readouterr().out
+    assert str(folder) in capfd.readouterr().out
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
     text = (folder / SCRIPT).read_text("utf-8")
     assert f"COMMAND = {[sys.executable, '-m', 'warpsplat']!a}\n" in text
@@ -29,12 +29,12 @@ def test_it_is_installed_and_removed(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert [path.name for path in folder.iterdir()] == ["other.py"]
 
 
-def test_files_of_others_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_others_stay(tmp_path: Path, cli: Cli) -> None:
     other = tmp_path / FILES[1]
     other.write_text("another")
     for words in ((), ("--remove",)):
-        assert run("inkscape", "--folder", tmp_path, *words) == 2
-        assert f"{other}: not a file of warpsplat" in one_line(capsys.readouterr().err)
+        said = cli("inkscape", "--folder", tmp_path, *words, code=2).line
+        assert f"{other}: not a file of warpsplat" in said
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(FILES[1], "another")]
 
 

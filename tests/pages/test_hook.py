@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import pytest
 
-from tests.cli.helpers import QUICK, one_line, run
+from tests.cli.helpers import QUICK, Cli, one_line, run
 
 MARK = "<!--warpsplat page-->"
 
 
-def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, cli: Cli) -> None:
     svg, page = tmp_path / "a.svg", tmp_path / "a.html"
-    assert run("vectorize", image, "-o", svg, "--report", page, "--json", *QUICK) == 0
-    assert json.loads(capfd.readouterr().out)["report"] == str(page)
+    said = cli("vectorize", image, "-o", svg, "--report", page, "--json", *QUICK).values
+    assert said["report"] == str(page)
     text = page.read_text("utf-8")
     assert MARK in text and "photo.png" in text
     words = re.findall("<span>(.*?)</span>", text[text.index('id="command"') :])
@@ -25,18 +24,8 @@ def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, capfd: pytest.Ca
     arguments = ("-o", better, "--iterations", "5", "--device", "cpu", "--report", page, "-q")
     assert run("refine", svg, image, *arguments) == 0  # our page may be replaced
     assert "<span>refine</span>" in page.read_text("utf-8") and "PSNR before" in page.read_text("utf-8")
-    capfd.readouterr()
-    assert run("eval", image, svg, "--report", page, "--json") == 0
-    assert json.loads(capfd.readouterr().out)["report"] == str(page)
+    assert cli("eval", image, svg, "--report", page, "--json").values["report"] == str(page)
     assert "<span>refine</span>" not in page.read_text("utf-8")
-
-
-@pytest.mark.parametrize("shape", ["ellipse", "rectangle", "line"])
-def test_a_report_of_other_shapes(shape: str, image: Path, tmp_path: Path) -> None:
-    svg, page = tmp_path / "a.svg", tmp_path / "a.html"
-    assert run("vectorize", image, "-o", svg, "--report", page, "--shape", shape, *QUICK) == 0
-    assert "<path" not in svg.read_text("utf-8")
-    assert "<span>--shape</span>" in page.read_text("utf-8")
 
 
 @pytest.mark.parametrize("place", ["photo.png", "a.svg", "a.txt", "-", "other.html", "no/a.html"])
@@ -75,13 +64,12 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
     ],
 )
 def test_a_batch_s_report_takes_no_other_file_s_place(
-    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], report: str, said: str
+    image: Path, tmp_path: Path, cli: Cli, report: str, said: str
 ) -> None:
     for name in ("notes.txt", "index.html"):
         (tmp_path / name).write_text("mine")
     before = sorted(tmp_path.rglob("*"))
-    manifest = ("--manifest", tmp_path / "m.html")
-    assert run("batch", image, "-o", tmp_path / "out", "--report", tmp_path / report, *manifest, *QUICK) == 2
-    assert said in one_line(capsys.readouterr().err)
+    places = ("-o", tmp_path / "out", "--report", tmp_path / report, "--manifest", tmp_path / "m.html")
+    assert said in cli("batch", image, *places, *QUICK, code=2).line
     assert sorted(tmp_path.rglob("*")) == before
     assert (tmp_path / "notes.txt").read_text() == (tmp_path / "index.html").read_text() == "mine"

@@ -12,7 +12,6 @@ import pytest
 
 import warpsplat
 from tests.fit.pictures import picture, step_for
-from tests.helpers import relative_error
 from tests.run.helpers import CLEAR, PICTURE, Both, fitted, slopes
 from tests.scenes import random_scene
 from warpsplat import CustomLoss
@@ -24,7 +23,7 @@ from warpsplat.fit.rounding import evaluate_file
 from warpsplat.fit.schedule import CHECK_INTERVAL
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
-from warpsplat.scene import Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import FloatArray, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
@@ -48,36 +47,6 @@ def red(image: FloatArray, target: FloatArray) -> Both:
 
 def shown(result: warpsplat.Result) -> FloatArray:
     return np.asarray(on_white(render_svg(result.svg)) / 255, np.float32)
-
-
-def scene_on(planes: int) -> Scene:
-    scene = random_scene(Kind.FILL, count=9, width=64, height=48, seed=1)
-    background = None if planes == 4 else np.full(3, 0.5, np.float32)
-    return scene if planes == 3 else Scene(**{**vars(scene), "canvas": Canvas(64, 48, background)})
-
-
-@pytest.mark.parametrize("factor", [1.0, 3.0])
-@pytest.mark.parametrize("planes", [3, 4])
-def test_a_custom_squared_error_gives_the_same_estimates(device: str, planes: int, factor: float) -> None:
-    """Removal costs, residuals, and where the error is: from the gradient, and the curvature measured."""
-
-    def several(image: FloatArray, target: FloatArray) -> Both:
-        value, gradient = squared(image, target)
-        return factor * value, factor * gradient
-
-    target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)[..., :planes]
-    settings, found = make_settings(texture=0.0), list[list[Any]]()
-    for loss in (None, CustomLoss(several, with_target=True), CustomLoss(several, with_target=True)):
-        step = step_for(scene_on(planes), target, device, settings, loss=loss)
-        step.renderer.forward_complete()
-        near, objective = step.objective.quadratic(), step.objective
-        found.append([objective.value(), near.removal_costs(), near.residual(), objective.by_pixel()])
-    (value, costs, residual, by_pixel), one, other = found
-    assert one[0] == pytest.approx(factor * value, rel=1e-5)
-    assert relative_error(one[1], factor * costs) < 1e-2
-    assert relative_error(one[2], residual) < 1e-2
-    assert relative_error(one[3], factor / 3 * by_pixel) < 1e-4
-    np.testing.assert_array_equal(one[1], other[1])
 
 
 @pytest.mark.parametrize("loss", [slopes, "edges", "ssim"])

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, run
 from tests.fit.pictures import picture
 from warpsplat.errors import ExitCode, ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
@@ -196,7 +196,7 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image() -> None:
 
 
 def test_refining_against_what_takes_too_much_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before its pixels are read."""
     image, svg, output = tmp_path / "a.png", tmp_path / "a.svg", tmp_path / "b.svg"
@@ -211,9 +211,7 @@ def test_refining_against_what_takes_too_much_is_refused(
     limit = memory.need_refined(facts, make_settings())
     assert run(*arguments, "--max-memory", limit) == 0
     monkeypatch.setattr("warpsplat.run.refine.load_target", None)
-    capsys.readouterr()
-    assert run(*arguments, "--max-memory", limit - 1) == ExitCode.RESOURCES
-    error = one_line(capsys.readouterr().err)
+    error = cli(*arguments, "--max-memory", limit - 1, code=ExitCode.RESOURCES).line
     assert "a.png: 65x49 pixels take about" in error
     monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
     with pytest.raises(

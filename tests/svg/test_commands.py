@@ -19,7 +19,6 @@ from warpsplat.svg.commands import (
     segments_of,
     shortest,
     shortest_ring,
-    shortest_smooth,
 )
 from warpsplat.svg.data import cubic_data
 from warpsplat.svg.paths import cubics
@@ -141,32 +140,3 @@ def test_files_of_drawings_come_back(per_pixel: float) -> None:
                 turns = [np.roll(ring, 3 * k, axis=0) for k in range(len(ring) // 3)]
                 kept = np.abs(np.stack([t for t in turns if t.shape == other.shape]) - other).max(axis=(1, 2))
                 assert kept.min() < 1e-4
-
-
-def every_smooth_text(joints: list[Pair], control: Pair) -> list[str]:
-    """Return the outline in each choice of relative and absolute commands."""
-    texts = []
-    for relative in itertools.product((True, False), repeat=len(joints) - 1):
-        text, last = f"M{row(joints[0], False)}", ""
-        for i, is_relative in enumerate(relative):
-            before, end = joints[i : i + 2]
-            letter = ("Q" if i == 0 else "T").lower() if is_relative else ("Q" if i == 0 else "T")
-            points = [control, end] if i == 0 else [end]
-            numbers = [x for point in points for x in (minus(point, before) if is_relative else point)]
-            text += row(numbers, True) if letter == last else letter + row(numbers, False)
-            last = letter
-        texts.append(text)
-    return texts
-
-
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("count", [2, 6])
-def test_no_other_smooth_text_is_shorter(seed: int, count: int) -> None:
-    points = np.random.default_rng(seed).integers(-20, 110, (count + 1, 2)).tolist()  # some outside
-    control, *joints = [(x, y) for x, y in points]
-    texts = every_smooth_text(joints, control)
-    data = shortest_smooth(joints, control)
-    assert data in texts
-    assert len(data) == min(map(len, texts))
-    shown, wanted = (cubics(text, keep_dots=True)[0].points for text in (data, texts[0]))
-    np.testing.assert_allclose(shown, wanted, atol=1e-9)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line, run
 from tests.scenes import disc
 from tests.svg.foreign import HEAD, PATH, SMALL
 from warpsplat.errors import ImageError
@@ -24,7 +24,9 @@ CRASHES = {
 
 
 @pytest.mark.parametrize("name", CRASHES)
-def test_crashes_of_resvg_are_one_line(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_crashes_of_resvg_are_one_line(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], cli: Cli
+) -> None:
     svg, image = tmp_path / "a.svg", tmp_path / "a.png"
     svg.write_text(f"{SMALL}{CRASHES[name]}</svg>")
     Image.new("RGB", (40, 30)).save(image)
@@ -32,8 +34,7 @@ def test_crashes_of_resvg_are_one_line(name: str, tmp_path: Path, capfd: pytest.
         assert run(*arguments) == 3
         message = f"warpsplat: {svg}: cannot be rendered: the renderer crashed"
         assert one_line(capfd.readouterr().err) == message
-    assert run("refine", svg, image, "-o", tmp_path / "b.svg") == 3
-    assert one_line(capfd.readouterr().err).startswith(f"warpsplat: {svg}: ")
+    assert cli("refine", svg, image, "-o", tmp_path / "b.svg", code=3).line.startswith(f"warpsplat: {svg}: ")
 
 
 def test_a_panic_on_a_text_of_our_own_is_an_error() -> None:

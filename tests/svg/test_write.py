@@ -22,7 +22,7 @@ from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
-from warpsplat.svg.data import integers, path_data, spline_data
+from warpsplat.svg.data import integers, path_data
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import data_uri, hex_colors, number
 from warpsplat.svg.paths import cubics
@@ -110,22 +110,6 @@ def test_groups_are_never_longer_than_none(levels: int) -> None:
         part = scene.take(np.flatnonzero(scene.kind == kind))
         back, _ = load_scene(write_svg(part, per_pixel=5), 40, 36, "a.svg")
         np.testing.assert_array_equal(back.opacities, rounded(part, 5).opacities)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_ring_is_written_from_its_cheapest_start(seed: int) -> None:
-    """No other start is shorter, and the order of its points does not matter."""
-    rng = np.random.default_rng(seed)
-    ring = np.round(rng.uniform(-150, 400, (9, 2)) * 2).astype(np.int64)
-    half = [(int(x), int(y)) for x, y in ring]
-    data = spline_data(half, closed=True)
-    lengths = []
-    for start in range(len(half)):
-        turned = half[start:] + half[:start]
-        assert len(spline_data(turned, closed=True)) == len(data)
-        lengths.append(len(spline_data(turned, closed=True, may_rotate=False)))
-    assert len(data) == min(lengths)
-    assert len(set(lengths)) > 1, "it matters"
 
 
 @pytest.mark.parametrize(("per_pixel", "decimals"), [(0.125, 1), (1, 1), (3, 1), (4, 0), (100, 0)])

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests import ROOT, fake_cuda
-from tests.cli.helpers import one_line, run
-from warpsplat.tools import against
+from tests.cli.helpers import Cli, one_line
 
 
-def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench(cli: Cli) -> None:
     options = ("--curves", 6, "--size", "48x32", "--repeats", 2, "--threads", 2, "--device", "cpu")
-    assert run("bench", *options, "--json") == 0
-    values = json.loads(capsys.readouterr().out)
+    values = cli("bench", *options, "--json").values
     assert values["threads"] == 2
     assert values["pairs"] > 6
     assert set(values["stages"]) == {"outline", "bins", "forward", "loss", "backward", "update"}
@@ -26,19 +22,17 @@ def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("kind", ["closed", "open"])
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
-def test_bench_table(kind: str, renderer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_table(kind: str, renderer: str, cli: Cli) -> None:
     options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--kind", kind, "--renderer", renderer)
-    assert run("bench", *options, "-v") == 0
-    shown = capsys.readouterr().out
+    shown = cli("bench", *options, "-v").out
     assert "megapixels/s" in shown
     assert "composite_backward" in shown
 
 
 @pytest.mark.needs("torch")
-def test_bench_through_torch(capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_through_torch(cli: Cli) -> None:
     options = ("--curves", 4, "--size", "32x32", "--repeats", 1, "--threads", 1, "--device", "cpu", "--torch")
-    assert run("bench", *options) == 0
-    shown = capsys.readouterr().out
+    shown = cli("bench", *options).out
     assert "alternately, torch" in shown
     assert "through PyTorch" in shown
 
@@ -55,9 +49,8 @@ def test_bench_through_a_torch_without_cuda(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("size", ["0x10", "10", "16x", "99999x99999", "axb"])
-def test_bench_refuses_odd_sizes(size: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("bench", "--size", size) == 2
-    assert "not a size" in one_line(capsys.readouterr().err)
+def test_bench_refuses_odd_sizes(size: str, cli: Cli) -> None:
+    assert "not a size" in cli("bench", "--size", size, code=2).line
 
 
 def folder_with_a_copy(folder: Path) -> Path:
@@ -69,10 +62,9 @@ def folder_with_a_copy(folder: Path) -> Path:
 SMALL = ("--curves", 3, "--size", "32x32", "--repeats", 1, "--rounds", 2, "--threads", 1, "--device", "cpu")
 
 
-def test_bench_against_another_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_against_another_copy(tmp_path: Path, cli: Cli) -> None:
     folder = folder_with_a_copy(tmp_path)
-    assert run("bench", *SMALL, "--against", folder, "--json") == 0
-    values = json.loads(capsys.readouterr().out)
+    values = cli("bench", *SMALL, "--against", folder, "--json").values
     this, other = values["sides"]
     assert other["folder"] == str(folder)
     assert this["folder"] != other["folder"]
@@ -85,53 +77,12 @@ def test_bench_against_another_copy(tmp_path: Path, capsys: pytest.CaptureFixtur
         assert times[1]["low"] / times[0]["high"] <= ratio["high"] * 1.01
 
 
-def test_bench_against_is_a_table_of_both(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The second side takes twice as long, whichever begins a round."""
-    order: list[str] = []
-
-    def answer(side: against.Side, command: str, *arguments: str) -> dict[str, Any]:
-        if command == "info":
-            return {"warpsplat": "1", "warp": "2", "python": "3"}
-        order.append(side.device)
-        time = dict.fromkeys(("median", "low", "high"), 2.0 if side.device == "cuda:0" else 1.0)
-        scene = {"kind": "open", "shapes": 3, "width": 32, "height": 32, "opacity": 0.5, "renderer": "exact"}
-        where = {"device": side.device, "device_name": "a name", "threads": 1}
-        return {**scene, **where, "step": time, "forward_backward": time, "stages": {"loss": time}}
-
-    monkeypatch.setattr(against.Side, "run", answer)
-    assert run("bench", *SMALL, "--against", "cuda:0") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert order == ["cpu", "cuda:0", "cuda:0", "cpu"]
-    assert lines[2].startswith("other: warpsplat 1 of ")
-    assert lines[2].endswith("cuda:0 (a name)")
-    assert lines[4].split() == [
-        "step",
-        "1.00",
-        "1.00",
-        "1.00",
-        "2.00",
-        "2.00",
-        "2.00",
-        "2.00",
-        "2.00",
-        "2.00",
-    ]
-    assert lines[-1] == "a step of the other takes 2.00 times as long"
-
-
 @pytest.mark.parametrize(
     ("other", "message"),
     [("nothing/like/it", "is no device"), (".", "no folder with a warpsplat"), ("cuda:77", "cuda:77")],
 )
 def test_bench_against_what_there_is_not(
-    other: str,
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    other: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run("bench", *SMALL, "--against", other) == 2
-    assert message in one_line(capsys.readouterr().err)
+    assert message in cli("bench", *SMALL, "--against", other, code=2).line

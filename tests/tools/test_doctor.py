@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,22 +9,21 @@ from typing import Any
 import pytest
 import warp as wp
 
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.tools import doctor
 
 
-def checked(capsys: pytest.CaptureFixture[str], code: int) -> dict[str, dict[str, Any]]:
+def checked(cli: Cli, code: int) -> dict[str, dict[str, Any]]:
     """Run the command and return its checks by name."""
-    assert run("doctor", "--device", "cpu", "--json") == code
-    found = json.loads(capsys.readouterr().out)
+    found = cli("doctor", "--device", "cpu", "--json", code=code).values
     assert found["ok"] is (code == 0)
     return {check["name"]: check for check in found["checks"]}
 
 
 @pytest.mark.usual_seed  # whose figure the self-test knows
-def test_all_is_well(capsys: pytest.CaptureFixture[str]) -> None:
-    found = checked(capsys, 0)
+def test_all_is_well(cli: Cli) -> None:
+    found = checked(cli, 0)
     assert "broken" not in {check["status"] for check in found.values()}
     assert found["packages"]["versions"].keys() >= {"numpy", "warp-lang", "pillow"}
     assert "cpu" in [device["name"] for device in found["devices"]["devices"]]
@@ -33,14 +31,11 @@ def test_all_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     assert 0 < found["adjoint"]["difference"] < doctor.MAX_DIFFERENCE
 
 
-def test_a_broken_package_and_wrong_kernels(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_broken_package_and_wrong_kernels(monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     monkeypatch.setitem(sys.modules, "yaml", None)
     monkeypatch.setattr(Renderer, "backward", lambda self: None)
     monkeypatch.setattr(doctor, "check_run", lambda device: 1 / 0)
-    assert run("doctor", "--device", "cpu") == 7
-    lines = capsys.readouterr().out.splitlines()
+    lines = cli("doctor", "--device", "cpu", code=7).out.splitlines()
     broken = [line.split(":")[0] for line in lines if line.startswith("BROKEN")]
     assert broken == ["BROKEN  packages", "BROKEN  self-test", "BROKEN  adjoint"]
     assert next(line for line in lines if "pyyaml (" in line)
@@ -65,6 +60,5 @@ def test_a_kernel_cache_of_no_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert (found.status, found.values["modules"]) == ("ok", 1)
 
 
-def test_an_unknown_device_is_found(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("doctor", "--device", "cuda:99") == 7
-    assert "BROKEN  self-test: unknown device 'cuda:99'" in capsys.readouterr().out
+def test_an_unknown_device_is_found(cli: Cli) -> None:
+    assert "BROKEN  self-test: unknown device 'cuda:99'" in cli("doctor", "--device", "cuda:99", code=7).out

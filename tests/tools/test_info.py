@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import json
-
-import pytest
-
-from tests.cli.helpers import run
+from tests.cli.helpers import Cli
 from warpsplat import __version__
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("--version") == 0
-    assert __version__ in capsys.readouterr().out
+def test_version(cli: Cli) -> None:
+    assert __version__ in cli("--version").out
 
 
-def test_info(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("info", "--json") == 0
-    values = json.loads(capsys.readouterr().out)
+def test_info(cli: Cli) -> None:
+    values = cli("info", "--json").values
     assert values["warpsplat"] == __version__
     assert "cpu" in [d["name"] for d in values["devices"]]
-    assert run("info") == 0
-    assert "(default)" in capsys.readouterr().out
+    assert "(default)" in cli("info").out

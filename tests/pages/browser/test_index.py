@@ -74,19 +74,3 @@ def test_links_lead_to_reports_and_back(index: Page) -> None:
     with index.expect_navigation():
         index.locator("tbody tr:nth-child(2) .small a").click()
     assert index.url.endswith("out/b%23%3F.svg")
-
-
-def test_a_second_run_lists_what_was_made_before(tmp_path: Path, tab: Page) -> None:
-    folder = tmp_path
-    make_index(folder)
-    page = folder / "pages" / "index-pages" / "a.svg.html"
-    made = page.read_bytes()
-    manifest = (folder / "out" / "warpsplat-manifest.jsonl").read_bytes()
-    page.unlink()
-    arguments = ("-o", folder / "out", "--report", folder / "pages", "-q", *QUICK, "--workers", 1)
-    assert run("batch", folder / "a.png", *arguments) == 0
-    assert (folder / "out" / "warpsplat-manifest.jsonl").read_bytes() == manifest
-    assert abs(len(page.read_bytes()) - len(made)) < 9000  # without the plots of the run
-    tab.goto((folder / "pages" / "index.html").as_uri())
-    assert names(tab) == ["a.png"]
-    assert (tab.locator("td.number").first.text_content() or "").strip()

@@ -16,7 +16,6 @@ from PIL import Image
 from tests.motion.helpers import recording
 from tests.scenes import mixed_scene
 from warpsplat import Recorder, Result
-from warpsplat.motion.timing import HOLD
 from warpsplat.scene import Basis, Kind
 from warpsplat.scene.geometry import bounds
 
@@ -136,16 +135,3 @@ def test_a_film_plays_in_an_image(
     page_with(tab, tmp_path, f'<img id="shown" src="a.{ending}" width="48">')
     first = shot(tab)
     assert comes(tab, lambda picture: bool(np.abs(picture - first).mean() > 2))
-
-
-def test_an_mp4_plays(tab: Page, recorded: tuple[Recorder, Result], tmp_path: Path) -> None:
-    """Most browsers know H.264, but not builds without patented codecs."""
-    pytest.importorskip("av", reason="pip install av, for MP4s")
-    recorded[0].save(tmp_path / "a.mp4", recorded[1], seconds=SECONDS, width=48)
-    page_with(tab, tmp_path, '<video id="shown" src="a.mp4" width="48" muted></video>')
-    if not tab.evaluate("shown.canPlayType('video/mp4; codecs=\"avc1.64000a\"')"):
-        pytest.skip("this browser plays no H.264")
-    first = shot(tab)
-    ended = "new Promise(done => { shown.onended = () => done(shown.currentTime); shown.play() })"
-    assert tab.evaluate(ended) == pytest.approx(SECONDS + HOLD, abs=0.15)
-    assert np.abs(shot(tab) - first).mean() > 2

@@ -19,10 +19,8 @@ from tests.pages.helpers import NASTY, Tags, data_of
 from warpsplat.fit.progress import Progress
 from warpsplat.pages.reports.pictures import (
     MAP_QUALITIES,
-    PAGE_PIXELS,
     ShownImage,
     encoded,
-    error_map,
     first_that_fits,
     shown_image,
 )
@@ -149,18 +147,6 @@ def test_the_size_of_a_page_is_limited(page: str) -> None:
     Image.fromarray(grain()).save(small, "JPEG", quality=5)
     made = warpsplat.report(SVG, small.getvalue(), device="cpu")
     assert len(made) <= len(SVG) + 2 * len(small.getvalue()) + 90_000  # half of it for pictures is still free
-
-
-def test_pictures() -> None:
-    wide = np.zeros((10, PAGE_PIXELS // 4, 3), np.uint8)
-    shown = shown_image(wide, None)
-    assert shown.reduced_size and shown.width == PAGE_PIXELS // 4
-    assert shown.pixels.shape[0] * shown.pixels.shape[1] <= PAGE_PIXELS
-    assert encoded(np.zeros((8, 8, 4), np.float32), math.inf).startswith("data:image/webp")
-    drawn = np.full((2, 2, 4), 255, np.uint8)
-    drawn[0, 0, :3] = 255 - 64
-    errors = error_map(drawn, np.ones((2, 2, 3), np.float32))
-    assert errors[1, 1].max() < 8 and errors[0, 0].min() > 100
 
 
 def test_only_the_picture_on_a_sheet_is_shown(tmp_path: Path) -> None:

@@ -14,11 +14,9 @@ from typing import Any
 import pytest
 
 import warpsplat.pages.serve.server as server_module
-from tests.cli.helpers import one_line, run
+from tests.cli.helpers import Cli, one_line, run
 from tests.pages.serve.helpers import Visitor, picture, until
-from warpsplat.pages.serve.runs import Limits
-from warpsplat.pages.serve.server import WarpsplatServer, is_loopback
-from warpsplat.pages.serve.worker import Machine
+from warpsplat.pages.serve.server import is_loopback
 
 
 def states(visitor: Visitor) -> Any:
@@ -54,9 +52,7 @@ def test_streams_end_with_the_server(visitor: Visitor) -> None:
     assert list(page) == []
 
 
-def test_ctrl_c_ends_it_and_its_worker(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_ends_it_and_its_worker(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
 
     def visit(address: str) -> None:
@@ -64,8 +60,7 @@ def test_ctrl_c_ends_it_and_its_worker(
         os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(webbrowser, "open", visit)
-    assert run("serve", "--port", 0, "--device", "cpu", "--open") == 128 + signal.SIGINT
-    shown = capsys.readouterr()
+    shown = cli("serve", "--port", 0, "--device", "cpu", "--open", code=128 + signal.SIGINT)
     address = shown.out.split()[1]
     assert shown.out == f"warpsplat: {address} (Ctrl-C ends it)\n" and shown.err == ""
     assert address.startswith("http://127.0.0.1:")
@@ -73,11 +68,11 @@ def test_ctrl_c_ends_it_and_its_worker(
     assert not [thread for thread in threading.enumerate() if thread.name == "runs"]
 
 
-def test_a_port_that_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_that_is_in_use(capfd: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert run("serve", "--port", port, "--device", "cpu") == 2
-    said = one_line(capsys.readouterr().err)
+    said = one_line(capfd.readouterr().err)
     assert said == f"warpsplat: port {port} of 127.0.0.1: Address already in use; --port 0 finds a free one"
 
 
@@ -90,32 +85,21 @@ def test_a_port_that_is_in_use(capsys: pytest.CaptureFixture[str]) -> None:
         (["--device", "cuda:77"], "unknown device 'cuda:77'"),
     ],
 )
-def test_invalid_options(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("serve", "--port", 0, *arguments) == 2
-    assert one_line(capsys.readouterr().err).startswith(f"warpsplat: {said}")
+def test_invalid_options(arguments: list[str], said: str, cli: Cli) -> None:
+    assert cli("serve", "--port", 0, *arguments, code=2).line.startswith(f"warpsplat: {said}")
 
 
-def test_without_its_packages(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_its_packages(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "warpsplat.pages.serve.server")
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    assert run("serve") == 2
-    assert one_line(capsys.readouterr().err).endswith('; pip install "warpsplat[serve]" installs it')
+    assert cli("serve", code=2).line.endswith('; pip install "warpsplat[serve]" installs it')
 
 
-def test_a_host_that_other_machines_reach_prints_a_warning(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_host_that_other_machines_reach_prints_a_warning(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module.WarpsplatServer, "run", lambda *_: None)
-    assert run("serve", "--port", 0, "--host", "0.0.0.0", "--device", "cpu") == 0
-    assert one_line(capsys.readouterr().err).startswith("warpsplat: --host 0.0.0.0: others can reach it")
+    said = cli("serve", "--port", 0, "--host", "0.0.0.0", "--device", "cpu").line
+    assert said.startswith("warpsplat: --host 0.0.0.0: others can reach it")
     for host in ("127.0.0.1", "127.1.2.3", "::1", "localhost"):
         assert is_loopback(host)
     for host in ("0.0.0.0", "::", "192.168.1.2", "example.org"):
         assert not is_loopback(host)
-
-
-def test_addresses() -> None:
-    server = WarpsplatServer("::1", 0, Machine(), Limits())
-    assert server.address().startswith(f"http://[::1]:{server.port}/?token=")
-    assert server.ticket() != server.address()
-    server.close()

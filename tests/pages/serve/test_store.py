@@ -95,10 +95,6 @@ def test_images_give_way_to_new_ones_but_not_while_they_are_needed() -> None:
         store.upload(second)
 
 
-def test_two_of_the_largest_images_fit() -> None:
-    assert Limits(upload=10**9).image_capacity == 2 * 10**9
-
-
 def test_the_oldest_results_go_first() -> None:
     store = Store(Limits(results=25, runs=3))
 
@@ -119,21 +115,6 @@ def test_the_oldest_results_go_first() -> None:
     assert kept() == unfinished
 
 
-def test_a_run_replaces_one_of_its_image_that_is_not_over() -> None:
-    store = Store(Limits())
-    image, other = (store.add_upload(upload()) for _ in range(2))
-    add(store, image)
-    kept = [do(store).id, add(store, other)]
-    add(store, image)
-    waiting = begin(store)
-    assert waiting.id == kept[1]
-    add(store, image)
-    running = begin(store)
-    kept.append(add(store, image))
-    assert running.stopping.is_set() and not store.is_wanted(running) and store.is_wanted(waiting)
-    assert [run["id"] for run in store.state()["runs"]] == kept
-
-
 def test_an_image_goes_with_its_runs() -> None:
     store = Store(Limits())
     one, other = (store.add_upload(upload()) for _ in range(2))
@@ -149,17 +130,6 @@ def test_an_image_goes_with_its_runs() -> None:
     for missing in (lambda: store.run(kept), lambda: store.remove_upload(one)):
         with pytest.raises(Refused):
             missing()
-
-
-def test_the_end() -> None:
-    store = Store(Limits())
-    add(store, store.add_upload(upload()))
-    running = begin(store)
-    add(store, store.add_upload(upload()))
-    version = store.version
-    store.close()
-    assert store.next() is None and running.stopping.is_set() and store.version > version
-    assert not any(held(store).values())
 
 
 @pytest.mark.parametrize(
