@@ -57,7 +57,7 @@ SMOKE = {
         "pages/serve/test_app.py::test_an_image_becomes_the_file_of_the_command_line",
         "portable",
     ),
-    "conventions": ("test_architecture.py", "test_smoke.py"),
+    "conventions": ("test_architecture.py",),
 }
 """Part -> beginnings of the names that pytest gives tests, within this folder."""
 

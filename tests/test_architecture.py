@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 
 from tests import ROOT
+from tests.needs import needs_missing
+from tests.smoke import NAMES
 from warpsplat import extensions
 
 CORE = ("errors", "native", "portable", "scene", "forms", "kernels")
@@ -217,3 +219,12 @@ def test_kernels_are_launched_by_name_only() -> None:
         and ast.unparse(node.func) in {"wp.launch", "wp.launch_tiled", "warp.launch"}
     ]
     assert homes == ["rendering.program"]
+
+
+def test_the_list_names_what_there_is() -> None:
+    for name in NAMES:
+        path, _, test = name.partition("::")
+        place = ROOT / path
+        if not needs_missing(place):
+            assert place.exists(), name
+            assert not test or f"\ndef {test.partition('[')[0]}" in place.read_text(encoding="utf-8"), name

@@ -27,21 +27,13 @@ from warpsplat.svg.write import write_svg
 
 
 def test_jobs(folder: Path) -> None:
-    jobs = load_jobs(
-        write(
-            folder,
-            """
+    text = """
 defaults: {curves: 9, open: true, output: out, device: cpu}
 jobs:
-  - images: in/[ab].*
-    closed: true
-  - images: [in/**/c.png, in/broken.png]
-    curves: 5
-    quality: draft
-    output: other
-""",
-        )
-    )
+  - {images: 'in/[ab].*', closed: true}
+  - {images: [in/**/c.png, in/broken.png], curves: 5, quality: draft, output: other}
+"""
+    jobs = load_jobs(write(folder, text))
     assert [(str(j.image.relative_to(folder)), str(j.output.relative_to(folder))) for j in jobs] == [
         ("in/a.png", "out/a.svg"),
         ("in/b.jpg", "out/b.jpg.svg"),
@@ -59,26 +51,14 @@ def test_every_setting_is_a_key(folder: Path) -> None:
     """Those of researchers as well, in the defaults and over them."""
     named = {name.replace("-", "_") for name in KEYS} | {"kind", "simplify"}
     assert {f.name for f in fields(Settings)} <= named
-    first, second = load_jobs(
-        write(
-            folder,
-            """
-defaults:
-  renderer: gaussian
-  xing: 0.01
-  order: age
-  through-scales: false
-  rates: {points: 0.5, colors: 0.01}
-  density: {interval: 400, opacity-start: 0.3}
+    text = """
+defaults: {renderer: gaussian, xing: 0.01, order: age, through-scales: false,
+  rates: {points: 0.5, colors: 0.01}, density: {interval: 400, opacity-start: 0.3}}
 jobs:
   - images: in/a.png
-  - images: in/b.jpg
-    renderer: exact
-    basis: spline
-    density: {interval: 100}
-""",
-        )
-    )
+  - {images: in/b.jpg, renderer: exact, basis: spline, density: {interval: 100}}
+"""
+    first, second = load_jobs(write(folder, text))
     assert (first.settings.order, first.settings.xing, first.settings.through_scales) == ("age", 0.01, False)
     assert (first.settings.rates["points"], first.settings.rates["colors"]) == (0.5, 0.01)
     assert (second.settings.renderer, second.settings.basis) == ("exact", Basis.SPLINE)

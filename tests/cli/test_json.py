@@ -1,4 +1,4 @@
-"""The objects of ``--json``: the same figures by every command."""
+"""The figures of eval and the objects of --json: the same by every command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import MANIFEST, QUICK, Cli, run
+from tests.cli.helpers import MANIFEST, QUICK, Cli, one_line, run
 
 
 @pytest.fixture(autouse=True)
@@ -61,3 +61,28 @@ def test_the_device_that_was_used(printed: Any, command: str, device: str) -> No
         words += ["--curves", "4,8" if command == "several" else "4"]
     found = printed(*words)
     assert (found[0] if command == "several" else found)["device"] == device
+
+
+def test_eval(image: Path, tmp_path: Path, cli: Cli) -> None:
+    output = tmp_path / "a.svg"
+    made = cli("vectorize", image, "-o", output, "--json", *QUICK).values
+    values = cli("eval", image, output, "--json").values
+    assert all(
+        values[k] == made[k] for k in ("psnr", "ssim", "ms_ssim", "paths", "nodes", "bytes", "gzip_bytes")
+    )
+    assert f"{made['psnr']} dB" in cli("eval", image, output).out
+
+
+def test_reports_have_ssimulacra2(
+    image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], cli: Cli
+) -> None:
+    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
+    runs = (
+        ("vectorize", image, "-o", first, *QUICK),
+        ("refine", first, image, "-o", second, "--iterations", "3", "--device", "cpu"),
+    )
+    for arguments in runs:
+        line = one_line(cli(*arguments).out)
+        assert run(*arguments, "--json") == 0
+        assert f", SSIMULACRA2 {json.loads(capfd.readouterr().out)['ssimulacra2']:.1f}" in line
+    assert "ssimulacra2 " in cli("eval", image, first).out

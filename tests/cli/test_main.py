@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -14,8 +15,10 @@ from PIL import Image
 
 from tests.cli.helpers import QUICK, Cli, one_line
 from tests.forks import CLOSED, Forks
+from warpsplat.cli.echo import notices
 from warpsplat.cli.main import COMMANDS, json_stream, report_error
 from warpsplat.errors import CapacityError
+from warpsplat.native import messages_hidden
 from warpsplat.svg.viewer import render_own
 
 FULL = "/dev/full"
@@ -154,3 +157,17 @@ def test_objects_keep_out_of_the_way_of_a_file(monkeypatch: pytest.MonkeyPatch, 
     assert json_stream(["vectorize", "-", "--output=-", "--json"]) == "stderr"
     assert json_stream(["vectorize", "--", "--json"]) is None
     assert json_stream(["vectorize", "a", "--json", "--", "-o", "-"]) == "stdout"
+
+
+@pytest.mark.parametrize(
+    ("terminal", "shown"), [(False, ""), (True, "\r\x1b[2Kwarpsplat: compiling: 3 s\r\x1b[2K")]
+)
+def test_temporary_messages_are_for_terminals(
+    terminal: bool, shown: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Native code's messages are hidden meanwhile."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
+    with notices(), messages_hidden():
+        for text in ("compiling: 3 s", ""):
+            logging.getLogger("warpsplat").info(text, extra={"passing": True})
+    assert capfd.readouterr().err == shown

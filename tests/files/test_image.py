@@ -1,4 +1,4 @@
-"""Reading of images, valid and invalid ones."""
+"""Reading of images and masks, valid and invalid ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import pytest
 from PIL import Image
 
 from tests.files.samples import RGB, RNG, bad_files, load_image, save
+from tests.fuzz.corpus import saved
 from warpsplat.errors import ImageError
+from warpsplat.files.sources import load_importance
 
 
 def test_modes(tmp_path: Path) -> None:
@@ -48,14 +50,6 @@ def test_16_bit_keeps_its_precision(tmp_path: Path) -> None:
         np.testing.assert_allclose(pixels[..., 2] * 65535, deep, atol=0.02, err_msg=name)
 
 
-def test_exif_rotation(tmp_path: Path) -> None:
-    exif = Image.Exif()
-    exif[0x0112] = 6
-    pixels = load_image(save(tmp_path, Image.fromarray(RGB), "a.png", exif=exif))
-    assert pixels.shape == (33, 20, 3)
-    np.testing.assert_allclose(pixels * 255, np.rot90(RGB, -1), atol=1e-4)
-
-
 def test_animation_gives_its_first_frame(tmp_path: Path) -> None:
     frames = [Image.new("RGB", (8, 8), c) for c in ("red", "blue")]
     path = save(tmp_path, frames[0], "a.gif", save_all=True, append_images=frames[1:])
@@ -86,13 +80,6 @@ def test_pillows_own_limit_does_not_apply(tmp_path: Path, monkeypatch: pytest.Mo
     """A photograph of 108 megapixels is no bomb."""
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert load_image(save(tmp_path, Image.fromarray(RGB), "a.png")).shape == (20, 33, 3)
-
-
-def test_bytes_are_read_as_a_file_is(tmp_path: Path) -> None:
-    path = save(tmp_path, Image.fromarray(RGB), "a.png")
-    np.testing.assert_array_equal(load_image(path.read_bytes()), load_image(path))
-    with pytest.raises(ImageError, match=r"^standard input: not an image"):
-        load_image(b"no image", "standard input")
 
 
 def test_strips_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -237,3 +224,42 @@ def test_opacity_that_a_file_does_not_use(tmp_path: Path) -> None:
         path = tmp_path / "d.tga"
         path.write_bytes(data)
         np.testing.assert_allclose(load_image(path)[0, 1] * 255, wanted, atol=1e-4)
+
+
+def as_png(pixels: np.ndarray) -> bytes:
+    return saved(Image.fromarray(pixels), "PNG")
+
+
+def test_grey_of_8_and_16_bits() -> None:
+    levels = np.array([[0, 51, 255], [102, 204, 0]])
+    for data in (as_png(levels.astype(np.uint8)), as_png((257 * levels).astype(np.uint16))):
+        np.testing.assert_allclose(load_importance(data, 3, 2), levels / 255, atol=1e-6)
+
+
+def test_colours_count_by_their_luma() -> None:
+    colours = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+    wanted = [[0.299, 0.587], [0.114, 1]]
+    np.testing.assert_allclose(load_importance(as_png(colours), 2, 2), wanted, atol=1e-5)
+
+
+def test_transparent_pixels_are_black() -> None:
+    """As in a face marked with a white brush on an empty layer."""
+    layer = np.full((2, 2, 4), 255, np.uint8)
+    layer[..., 3] = [[0, 255], [51, 0]]
+    np.testing.assert_allclose(load_importance(as_png(layer), 2, 2), [[0, 1], [0.2, 0]], atol=1e-6)
+
+
+@pytest.mark.parametrize(("wide", "tall"), [(768, 512), (1536, 1024), (100, 66), (100, 67), (3, 2)])
+def test_any_size_of_the_same_proportions(wide: int, tall: int) -> None:
+    assert load_importance(as_png(np.zeros((tall, wide), np.uint8)), 768, 512).shape == (tall, wide)
+
+
+@pytest.mark.parametrize(("wide", "tall"), [(512, 768), (768, 500), (100, 68), (3, 3)])
+def test_other_proportions_are_refused(wide: int, tall: int) -> None:
+    with pytest.raises(ImageError, match=rf"^m\.png: {wide}x{tall} pixels; .* 768x512 image$"):
+        load_importance(as_png(np.zeros((tall, wide), np.uint8)), 768, 512, "m.png")
+
+
+def test_no_image() -> None:
+    with pytest.raises(ImageError, match=r"^m\.png: not an image"):
+        load_importance(b"none", 3, 2, "m.png")

@@ -55,13 +55,11 @@ def test_results_of_equal_runs_are_equal(results: list[warpsplat.Result]) -> Non
     ],
 )
 def test_scenes_are_equal_if_their_values_are(scene: Scene) -> None:
-    copy = replace(
-        scene, **{name: value.copy() for name, value in vars(scene).items() if isinstance(value, np.ndarray)}
-    )
-    assert copy == scene
-    assert hash(copy) == hash(scene)
-    for name, value in vars(scene).items():
-        if isinstance(value, np.ndarray) and value.size and value.dtype == np.float32:
+    arrays = {name: value for name, value in vars(scene).items() if isinstance(value, np.ndarray)}
+    copy = replace(scene, **{name: value.copy() for name, value in arrays.items()})
+    assert copy == scene and hash(copy) == hash(scene)
+    for name, value in arrays.items():
+        if value.size and value.dtype == np.float32:
             assert replace(scene, **{name: value + 1}) != scene, name
     assert scene.take(np.arange(len(scene) - 1)) != scene
     for changed in ({"background": np.ones(3, np.float32)}, {"background": None, "crisp": True}):

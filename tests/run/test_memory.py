@@ -71,14 +71,9 @@ def test_a_need_grows_with_all_that_takes_memory() -> None:
     assert 2 << 30 < base < 4e9
     assert need(HUGE, Settings(), 2) < base / 1.5 < base < need(replace(HUGE, kept=6), Settings())
     small = ImageFacts(1200, 900, 3, 4, drafts=False)
-    for more in (
-        {"curves": 8000},
-        {"open": True},
-        {"paint": "auto"},
-        {"levels": "8,512"},
-        {"subject": "line"},
-    ):
-        assert need(small, make_settings(**more)) > need(small, Settings()), more
+    options = ("curves", 8000), ("open", True), ("paint", "auto"), ("levels", "8,512"), ("subject", "line")
+    for name, value in options:
+        assert need(small, make_settings(**{name: value})) > need(small, Settings()), name
 
 
 def test_the_size_is_the_largest_within_the_limit() -> None:
@@ -141,6 +136,15 @@ def test_an_image_is_read_smaller(mode: str, kind: str, options: dict[str, objec
     facts = image_facts(data)
     assert facts and (facts.width, facts.height, facts.channels) == (WIDTH, HEIGHT, whole.shape[2])
     assert (facts.kept > 0) == ("progressive" in options) and facts.deep == (mode == "I;16")
+
+
+def test_a_turned_image_is_read_smaller() -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    data = encoded(pixels(), "JPEG", exif=exif, quality=95)
+    assert image_of(data, factor=2).shape == (33, 25, 3)
+    facts = image_facts(data)
+    assert facts and (facts.width, facts.height) == (HEIGHT, WIDTH)
 
 
 @pytest.mark.parametrize("mode", ["RGB", "RGBA"])

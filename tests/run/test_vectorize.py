@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +22,7 @@ from warpsplat.fit.progress import Progress
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
-from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
+from warpsplat.run.figures import missed_goals
 from warpsplat.scene import Kind, Scene
 from warpsplat.svg.write import read_metadata
 
@@ -90,13 +89,6 @@ def test_time_budget_sizes_the_run(device: str) -> None:
     assert not result.stopped
 
 
-def test_ssimulacra2_is_left_out_in_large_images_and_short_times() -> None:
-    small, large = np.zeros((1000, 1000, 3), np.float32), np.zeros((1000, 1001, 3), np.float32)
-    assert has_time_for_ssimulacra2(make_settings(), small)
-    assert not has_time_for_ssimulacra2(make_settings(), large)
-    assert not has_time_for_ssimulacra2(make_settings(time_budget="2m"), small)
-
-
 def test_target_psnr_is_reached_with_few_bytes(device: str) -> None:
     """The file is smaller than one of a fixed number of shapes."""
     settings = make_settings(iterations=100, target_psnr=24.0)
@@ -154,16 +146,6 @@ def test_a_simple_image_gets_fewer_shapes_unless_told(device: str) -> None:
     assert len(vectorize(target, settings, Backend.on(device)).scene) == 32
     told = make_settings(iterations=5, curves=50)
     assert len(vectorize(target, told, Backend.on(device)).scene) == 50
-
-
-def test_shapes_of_one_colour_are_named_groups(device: str) -> None:
-    """Brought together where that shows the same."""
-    settings = make_settings(subject="photo", curves=16, colors=2, iterations=40, ids=True)
-    text = vectorize(picture(), settings, Backend.on(device)).svg
-    paths = len(re.findall("<path", text))
-    grouped = sum(inner.count("<path") for inner in re.findall(r'<g id="[a-z]+-group.*?</g>', text))
-    assert paths == 16
-    assert grouped >= 8, "13 to 15 over five seeds"
 
 
 LINES = np.ones((64, 64, 3), np.float32)

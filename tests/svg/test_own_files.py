@@ -1,4 +1,4 @@
-"""Files written here, read back: nothing is lost, and written again they are the same bytes."""
+"""Files written here, read back: nothing is lost, gradients as well, and the bytes are the same."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.scenes import CURVES, ragged_scene, random_scene, started_alike
+from tests.scenes import CURVES, mixed_scene, ragged_scene, random_scene, started_alike, with_gradients
 from tests.svg.foreign import ROUND, SMALL
 from warpsplat.metrics import psnr
-from warpsplat.scene import Basis, Kind, Scene
+from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import Basis, Canvas, Kind, Paint, Scene
 from warpsplat.svg.read import load_scene
-from warpsplat.svg.viewer import on_white, render_svg
+from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 
 CUBIC, SPLINE = CURVES
@@ -136,3 +138,35 @@ def test_strokes_of_smooth_quadratics_are_splines_clamped_at_both_ends() -> None
     closed = scene_of(RING + "z", ROUND)
     np.testing.assert_allclose(closed.points, CORNERS, atol=1e-5)
     assert closed.closed.tolist() == [1]
+
+
+def likeness(scene: Scene, device: str) -> float:
+    """Return the PSNR of our rendering and that of the file [dB]."""
+    mine = render(rounded(scene, 10), backend=Backend.on(device)).astype(np.float64)
+    shown = premultiplied(render_own(write_svg(scene, per_pixel=10)))
+    return psnr(255 * mine, shown[..., : mine.shape[2]])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("clear", [False, True])
+def test_a_viewer_shows_what_we_render(device: str, seed: int, clear: bool) -> None:
+    scene = with_gradients(mixed_scene(80, 70, seed=seed), seed=seed)
+    if clear:
+        scene = replace(scene, canvas=Canvas(80, 70, None))
+    assert likeness(scene, device) > 38
+
+
+def test_equal_gradients_are_written_once() -> None:
+    scene = with_gradients(random_scene(Kind.FILL, 3))
+    text = write_svg(scene.take(np.array([0, 0, 1, 2])))
+    assert text.count("<linearGradient") == text.count("<radialGradient") == 1
+    assert text.count("url(#g0)") == 1, "in the group of both"
+
+
+def test_a_skewed_frame(device: str) -> None:
+    """Lines of equal colour run along the second axis, which is not at a right angle."""
+    scene = with_gradients(random_scene(Kind.FILL, 2, seed=3), seed=2)
+    frames = scene.frames.copy()
+    frames[0] = [20, 18, 8, 3, 5, 9]
+    paint = np.array([Paint.LINEAR, Paint.FLAT], np.int32)
+    assert likeness(replace(scene, frames=frames, paint=paint), device) > 38

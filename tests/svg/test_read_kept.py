@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,8 +18,6 @@ from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.svg.document import Document
-from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.read import load_kept, load_scene
 from warpsplat.svg.viewer import on_white
 from warpsplat.svg.write import write_svg
@@ -200,20 +197,3 @@ def test_refusals(before: str, root: str, body: str, message: str) -> None:
     with pytest.raises(ImageError, match=message) as caught:
         load_kept(f'{before}{HEAD}width="40" height="30" {root}>{body}</svg>', 40, 30, "a.svg")
     assert len(str(caught.value).splitlines()) == 1
-
-
-def test_places_of_elements() -> None:
-    """Despite quotes, comments and letters of two bytes."""
-    text = (
-        f'{HEAD}width="40" height="30"><!-- <g> é --><g a="/>é" b=\'"\'><path d="M0 0"/>é<path d="M1 1" >'
-        "</path ></g ><text><![CDATA[<g>]]></text></svg>"
-    )
-    document = Document(text)
-    excerpts = Excerpts(text, document)
-    group, label = document.root
-    assert excerpts.of([group[1]], (40, 30)).endswith(
-        '<g a="/>é" b=\'"\'><path d="M1 1" ></path ></g ></svg>'
-    )
-    assert "<text><![CDATA[<g>]]></text>" in excerpts.of([label], (40, 30))
-    both = excerpts.of([label, group[0]], (40, 30))
-    assert re.search(r"<g [^<]*<path d=\"M0 0\"/></g ><text>", both)

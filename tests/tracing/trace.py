@@ -111,11 +111,6 @@ class Count:
         """Return the bytes that have to come from memory or go there, each sector once."""
         return sum(one.sectors_read + one.sectors_written for one in self.memory.values())
 
-    @property
-    def requested(self) -> int:
-        """Return the bytes that threads ask for."""
-        return sum(one.read + one.written for one in self.memory.values())
-
 
 @dataclass
 class Tracer:

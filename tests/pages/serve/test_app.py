@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import io
-import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,6 @@ import warpsplat
 from tests.pages.serve.helpers import Visitor, held, picture, until
 from warpsplat.fit.settings import make_settings
 from warpsplat.pages.serve.runs import Limits
-from warpsplat.rendering.parameters import Parameters
 from warpsplat.run.formats import missing, named_bytes
 from warpsplat.run.options import preset_names
 
@@ -148,31 +145,6 @@ def test_what_is_saved(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> Non
     assert one_line(answer.text).startswith(
         "photo.dxf: DXFs need a package that is not installed: pip install "
     )
-
-
-def test_a_run_leaves_only_its_file(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Arrays are freed when it is over, the image when it is removed, without collecting cycles."""
-    arrays: list[weakref.ref[object]] = []
-    create = Parameters.__init__
-
-    def noted(self: Parameters, *given: Any, **named: Any) -> None:
-        arrays.append(weakref.ref(self))
-        create(self, *given, **named)
-
-    monkeypatch.setattr(Parameters, "__init__", noted)
-    gc.collect()
-    gc.disable()
-    try:
-        image = visitor.upload(picture())
-        run = visitor.over(visitor.begin(image, **SHORT))
-        held: list[weakref.ref[object]] = [weakref.ref(visitor.store.upload(image))]
-        held.append(weakref.ref(visitor.store.run(run["id"])))
-        assert arrays
-        until(lambda: not [each for each in arrays if each()])
-        assert visitor.client.delete(visitor.at("images", image)).status_code == 204
-        until(lambda: not [each for each in held if each()])
-    finally:
-        gc.enable()
 
 
 @pytest.mark.parametrize(
