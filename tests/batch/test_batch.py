@@ -15,7 +15,7 @@ from PIL import Image
 from tests.batch.helpers import Answers, answers, load_jobs, write
 from tests.cli.helpers import Cli, one_line, run
 from warpsplat.batch.display import BatchDisplay
-from warpsplat.batch.manifest import NAME, entry_of
+from warpsplat.batch.manifest import NAME, Manifest, entry_of
 from warpsplat.batch.run import JobOutcome
 
 
@@ -229,6 +229,24 @@ def test_several_images_of_vectorize(folder: Path, cli: Cli, monkeypatch: pytest
         assert said.count("\n") == 1
     assert run("vectorize", "in/a.png", "in/broken.png", *SMALL) == 5
     assert Path("a.svg").exists()
+
+
+def test_what_another_process_has_in_work_is_waited_for(
+    folder: Path, batch: Answers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is done elsewhere in the end, or, if that process dies, here; other images need not wait."""
+    asked: list[str] = []
+    claim = Manifest.claim
+
+    def reluctant(notes: Manifest, output: Path, key: str) -> bool:
+        asked.append(output.name)
+        return claim(notes, output, key) if asked.count(output.name) > 2 or output.name == "b.svg" else False
+
+    monkeypatch.setattr(Manifest, "claim", reluctant)
+    images, _ = batch("batch", folder / "in" / "a.png", folder / "in" / "b.png", *SMALL)
+    made = [(Path(image["output"]).name, image["status"]) for image in images]
+    assert made == [("b.svg", "made"), ("a.svg", "made")]
+    assert asked == ["a.svg", "b.svg", "a.svg", "a.svg"]
 
 
 @pytest.mark.slow

@@ -85,6 +85,21 @@ def test_shapes_that_can_still_be_read_are(fail: Fail) -> None:
     assert caught.value.result.score.psnr > 15
 
 
+@pytest.mark.parametrize("run", [fitted, refined])
+def test_what_follows_the_fit_may_fail_too(run: Make, fail: Fail, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then the fit is whole, but for the pixels that should be empty."""
+    fail(-1)
+
+    def refused(*_: Any) -> None:
+        raise RuntimeError("Graph creation error: Warp CUDA error 2: out of memory (in function f)")
+
+    for place in ("fit.clear", "run.refine"):
+        monkeypatch.setattr(f"warpsplat.{place}.clear_empty", refused)
+    with pytest.raises(DeviceError, match=r"not enough memory; .* after 56 steps") as caught:
+        run(image=CLEAR, background="none")
+    assert caught.value.result.iterations == 56
+
+
 def test_of_a_drawing_the_trace_is_left(fail: Fail, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     fail(-1)
 

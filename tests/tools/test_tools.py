@@ -70,6 +70,9 @@ SMALL = ("--curves", 3, "--size", "32x32", "--repeats", 1, "--rounds", 2, "--thr
 
 def test_bench_against_another_copy(tmp_path: Path, cli: Cli) -> None:
     folder = folder_with_a_copy(tmp_path)
+    lines = cli("bench", *SMALL, "--against", folder).out.splitlines()
+    assert lines[2].startswith("other: warpsplat ") and lines[4].split()[0] == "step"
+    assert lines[-1].startswith("a step of the other takes ")
     values = cli("bench", *SMALL, "--against", folder, "--json").values
     this, other = values["sides"]
     assert other["folder"] == str(folder)
