@@ -71,12 +71,12 @@ def test_grey_and_bits_are_images(device: str) -> None:
         ("missing.png", "missing.png: no such file"),
     ],
 )
-def test_what_is_no_image_is_refused(image: object, message: str) -> None:
+def test_invalid_images_are_refused(image: object, message: str) -> None:
     with pytest.raises(warpsplat.ImageError, match=message):
         warpsplat.vectorize(image)
 
 
-def test_another_thing_is_refused() -> None:
+def test_wrong_types_are_refused() -> None:
     with pytest.raises(TypeError, match="not int"):
         warpsplat.vectorize(7)
     with pytest.raises(TypeError, match="not float"):
@@ -106,7 +106,7 @@ def test_settings_and_their_values_exclude_each_other() -> None:
 
 
 @pytest.mark.parametrize("nothing", ["", " \n", b""])
-def test_nothing_is_neither_a_path_nor_an_svg(nothing: str | bytes) -> None:
+def test_an_empty_svg_is_refused(nothing: str | bytes) -> None:
     for read in (warpsplat.load_svg, lambda svg: warpsplat.score(svg, photograph())):
         with pytest.raises(warpsplat.ImageError, match=r"^the SVG: is empty: give an SVG's text"):
             read(nothing)
@@ -155,7 +155,7 @@ def test_the_command_line_api_and_file_agree(tmp_path: Path, device: str) -> Non
     np.testing.assert_allclose(warpsplat.render(result.scene, device=device), shown, atol=0.003)
 
 
-def test_what_is_saved_is_loaded(tmp_path: Path, device: str) -> None:
+def test_a_saved_scene_is_loaded(tmp_path: Path, device: str) -> None:
     scene = warpsplat.vectorize(photograph(4), device=device, **QUICK).scene
     text = warpsplat.save_svg(scene, tmp_path / "a.svg", precision=4, title="a <b>", minify=True)
     assert (tmp_path / "a.svg").read_text() == text
@@ -218,7 +218,7 @@ EXTENSIONS_OF = {"report": "pages", "Recorder": "motion", "Live": "motion", "loa
 """Public names of extensions."""
 
 
-def test_what_is_public_is_there_and_light() -> None:
+def test_public_names_exist_and_import_quickly() -> None:
     public = {
         *("vectorize", "refine", "render", "load_svg", "save_svg", "score", "to_pillow", "make_settings"),
         *("starting_scene", "load_image", "vectorize_several", "suggest", "CustomLoss"),

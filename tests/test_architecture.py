@@ -144,7 +144,7 @@ def test_imports_in_the_core_point_one_way() -> None:
     assert not wrong
 
 
-def test_the_table_names_what_there_is() -> None:
+def test_all_modules_of_the_table_exist() -> None:
     for name, others in ALLOWED.items():
         for module in (name, *others):
             assert module in modules(), module
@@ -221,7 +221,7 @@ def test_kernels_are_launched_by_name_only() -> None:
     assert homes == ["rendering.program"]
 
 
-def test_the_list_names_what_there_is() -> None:
+def test_all_smoke_tests_exist() -> None:
     for name in NAMES:
         path, _, test = name.partition("::")
         place = ROOT / path

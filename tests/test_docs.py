@@ -172,7 +172,7 @@ def defines(name: str) -> bool:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_what_pages_name_is_there(page: Path) -> None:
+def test_files_and_modules_named_by_pages_exist(page: Path) -> None:
     """Source files, modules and names in them, and commands of the tests."""
     text = REMOVED.sub("", re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL))
     for file in re.findall(r"`([\w/]+\.py)\b[^`\n]*`", text) if page.name not in OTHERS else ():

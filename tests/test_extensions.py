@@ -32,7 +32,7 @@ def test_all_are_found() -> None:
 
 
 @pytest.mark.parametrize("name", extensions.extensions())
-def test_what_is_declared_is_there(name: str) -> None:
+def test_all_targets_of_an_extension_exist(name: str) -> None:
     one = extensions.extensions()[name]
     for command in one.commands.values():
         assert isinstance(load(command.target), click.Command)

@@ -108,7 +108,7 @@ REFUSED = {
     "colour": (f'<path fill="rgb({DIGITS}x,1,1)" d="M0 0h9v9z"/>', "."),
     "transform": (f'<path transform="scale({DIGITS}x)" d="M0 0h9v9z"/>', "."),
     "data": (f'<path d="M0 {DIGITS}xh9v9z"/>', "."),
-    "closed data": (f'<path d="M0 0{"z" * LONG}"/><text/>', "."),
+    "closed data": (f'<path d="M0 0{"z" * (LONG // 5)}"/><text/>', "."),
     "smooth data": (f'<path d="M0 0h9{"S1 1 2 2" * (LONG // 10)}"/><text/>', "."),
     "radius": (f'<circle r="{DIGITS}x"/>', "."),
     "points": (f'<polygon points="{DIGITS}x 9 9 9"/>', "."),

@@ -46,7 +46,7 @@ def test_a_run_reports_skips_and_redoes(folder: Path, cli: Cli, batch: Answers) 
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_an_interrupted_run_says_what_is_left(
+def test_an_interrupted_run_counts_what_is_left(
     folder: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch, as_json: bool
 ) -> None:
     for i in range(5):
@@ -88,9 +88,7 @@ class PanicException(BaseException):
     pass
 
 
-def test_whatever_an_image_throws_is_its_own_failure(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
-) -> None:
+def test_any_exception_fails_only_its_image(folder: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     """Even what is no ``Exception``."""
     words = "renderer gave up: index out of bounds"
 
@@ -117,7 +115,7 @@ def test_a_line_break_in_a_name_breaks_no_line(folder: Path, cli: Cli) -> None:
     ]
 
 
-def test_another_mask_makes_another_result(folder: Path, cli: Cli, batch: Answers) -> None:
+def test_a_changed_mask_makes_the_image_again(folder: Path, cli: Cli, batch: Answers) -> None:
     """By its content; one that is missing or of other proportions is the failure of its image."""
     (folder / "masks").mkdir()
     mask = folder / "masks" / "face.png"
@@ -145,7 +143,7 @@ def test_another_mask_makes_another_result(folder: Path, cli: Cli, batch: Answer
 SMALL = ("--curves", "3", "--iterations", "3", "--device", "cpu")
 
 
-def test_what_bears_no_mark_is_known_by_the_manifest(
+def test_minified_results_are_known_by_the_manifest(
     folder: Path, capfd: pytest.CaptureFixture[str], batch: Answers
 ) -> None:
     """Also where a run was killed after the file was there and before that was noted."""
@@ -231,7 +229,7 @@ def test_several_images_of_vectorize(folder: Path, cli: Cli, monkeypatch: pytest
     assert Path("a.svg").exists()
 
 
-def test_what_another_process_has_in_work_is_waited_for(
+def test_images_that_another_process_works_on_are_waited_for(
     folder: Path, batch: Answers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is done elsewhere in the end, or, if that process dies, here; other images need not wait."""

@@ -58,7 +58,7 @@ def test_pictures_are_made_once_with_and_without_a_manifest(
     assert batch(*again)[1]["made"] == 2, "none is whole"
 
 
-def test_pictures_of_others_stay(folder: Path, cli: Cli) -> None:
+def test_foreign_pictures_are_not_replaced(folder: Path, cli: Cli) -> None:
     theirs = folder / "out" / "a.png"
     theirs.parent.mkdir()
     Image.new("RGB", (9, 9)).save(theirs)

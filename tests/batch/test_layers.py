@@ -107,14 +107,14 @@ def test_names_of_results(folder: Path, output: str, made: str) -> None:
         ("curves=!!python/object:os.system x", "is not plain YAML"),
     ],
 )
-def test_what_cannot_be_set(text: str, words: str) -> None:
+def test_invalid_set_options_are_refused(text: str, words: str) -> None:
     with pytest.raises(UsageError) as caught:
         command_layer({}, [text])
     assert words in str(caught.value)
     assert text in str(caught.value)
 
 
-def test_what_can_be_set() -> None:
+def test_values_of_set_options() -> None:
     assert assigned("curves=12") == ("curves", 12)
     assert assigned("output=007") == ("output", "007")
     assert assigned("density.interval=9") == ("density", {"interval": 9})
@@ -146,7 +146,7 @@ def test_inputs_of_the_command_line(folder: Path, monkeypatch: pytest.MonkeyPatc
             plan_jobs([name])
 
 
-def test_where_the_manifest_is(folder: Path) -> None:
+def test_the_place_of_the_manifest(folder: Path) -> None:
     """With the results; of several folders of them, in the one that holds all, or with the batch file."""
     path = str(folder / "jobs.yaml")
     for outputs, home in (
@@ -174,7 +174,7 @@ def test_shards_are_parts_whatever_the_list(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "-1/3"])
-def test_what_is_no_shard(folder: Path, cli: Cli, text: str) -> None:
+def test_invalid_shards_are_refused(folder: Path, cli: Cli, text: str) -> None:
     assert "is not of the form I/N" in cli("batch", folder / "in", "--shard", text, code=2).err
 
 
@@ -182,7 +182,7 @@ STYLES = ["brush", "ink", "low-poly", "placeholder", "poster", "stained-glass"]
 MACHINES = ["embroidery", "laser-cut", "laser-engrave", "plotter", "stencil", "vinyl"]
 
 
-def test_those_that_there_are() -> None:
+def test_all_presets_are_valid_and_described() -> None:
     assert preset_names() == sorted(STYLES + MACHINES)
     for name in preset_names():
         make_settings(**load_preset(name))
@@ -190,7 +190,7 @@ def test_those_that_there_are() -> None:
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_those_for_machines_make_outlines_of_a_known_size(name: str, tmp_path: Path) -> None:
+def test_presets_for_machines_make_outlines_of_a_known_size(name: str, tmp_path: Path) -> None:
     pixels = np.full((40, 60, 3), 255, np.uint8)
     pixels[10:30, 15:45] = (0, 0, 0)
     made = warpsplat.vectorize(pixels, preset=name, quality="draft", device="cpu")

@@ -61,7 +61,7 @@ def test_a_torn_line_is_ignored_and_ends_where_the_next_begins(notes: Manifest) 
     ],
     ids=map(str, range(14)),  # lines hold the time of day, which names of tests must not
 )
-def test_what_is_no_entry_is_none(line: bytes) -> None:
+def test_invalid_lines_are_no_entries(line: bytes) -> None:
     assert entry_of(line) is None
 
 
@@ -80,7 +80,7 @@ def test_an_error_is_one_line_that_commands_nothing() -> None:
     assert entry.error.startswith("one")
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+def test_a_manifest_must_be_a_regular_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (
         tmp_path,

@@ -265,7 +265,7 @@ jobs:
     assert [job.settings.rates["points"] for job in jobs] == [0.5, 0.25]
 
 
-def test_files_of_others_are_named_before_anything_starts(
+def test_foreign_results_are_named_before_anything_starts(
     folder: Path, capfd: pytest.CaptureFixture[str], cli: Cli
 ) -> None:
     drawn = "<svg xmlns='http://www.w3.org/2000/svg'/>"

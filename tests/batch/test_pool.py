@@ -50,7 +50,7 @@ def test_workers_are_kept_and_their_notices_heard(tmp_path: Path, caplog: pytest
     assert "a notice" in caplog.text
 
 
-def test_a_death_costs_a_second_try_and_a_second_one_the_image(tmp_path: Path) -> None:
+def test_an_image_fails_if_its_worker_dies_twice(tmp_path: Path) -> None:
     found = outcomes(tasks(tmp_path, "die once", "die", "a"))
     assert [outcome.status for outcome in found] == ["made", "failed", "made"]
     assert found[1].error.startswith("die: its worker process was killed (SIGKILL")
@@ -80,7 +80,7 @@ def test_no_more_is_taken_than_there_are_workers_and_nothing_after_a_stop(tmp_pa
     assert sorted((outcome.number, outcome.status) for outcome in found) == [(0, "stopped"), (1, "stopped")]
 
 
-def test_what_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "GRACE", 0.1)
     begun: list[int] = []
     with Pool(1) as used:

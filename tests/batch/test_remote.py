@@ -65,7 +65,7 @@ def test_the_bytes_of_a_local_batch(store: Any, tmp_path: Path) -> None:
     assert (tmp_path / "there/a.svg").read_bytes() == wanted
 
 
-def test_what_others_wrote_stays(store: Any, capfd: pytest.CaptureFixture[str]) -> None:
+def test_foreign_results_at_a_url_are_not_replaced(store: Any, capfd: pytest.CaptureFixture[str]) -> None:
     store.pipe_file("/bucket/out/a.svg", b"<svg>mine</svg>")
     assert batch("memory://bucket/in/a.png", "-o", "memory://bucket/out") == 2
     assert "memory://bucket/out/a.svg" in capfd.readouterr().err

@@ -124,7 +124,7 @@ def test_how_curves_are_written(image: Path, tmp_path: Path) -> None:
     assert b"AC1009" in made[0] and b"AC1018" in made[2]
 
 
-def test_what_is_no_path_is_refused_before_any_work(image: Path, tmp_path: Path, cli: Cli) -> None:
+def test_kept_text_is_refused_in_an_eps_before_any_work(image: Path, tmp_path: Path, cli: Cli) -> None:
     svg = tmp_path / "a.svg"
     svg.write_text(PATHS.replace("</svg>", "<text>a</text></svg>"))
     said = cli("refine", svg, image, "--keep", "-o", tmp_path / "b.eps", "--iterations", 3, code=3).line

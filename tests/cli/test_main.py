@@ -113,7 +113,7 @@ RAISED = [
 
 
 @pytest.mark.parametrize(("error", "code", "words"), RAISED)
-def test_whatever_is_raised_is_one_line_and_a_code(
+def test_any_exception_is_one_line_and_an_exit_code(
     error: BaseException,
     code: int,
     words: str,
@@ -149,7 +149,7 @@ def test_an_image_without_a_command_is_vectorized(
     assert (tmp_path / "photo.svg").exists()
 
 
-def test_objects_keep_out_of_the_way_of_a_file(monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
+def test_json_and_a_file_use_different_streams(monkeypatch: pytest.MonkeyPatch, cli: Cli) -> None:
     captured = cli("vectorize", "missing.png", "-o", "-", "--json", code=3)
     assert captured.out == ""
     line, found = captured.err.splitlines()

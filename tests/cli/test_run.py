@@ -82,7 +82,7 @@ def test_work_weighs_steps_by_their_pixels() -> None:
 
 
 @pytest.mark.slow
-def test_compiling_is_said_on_a_terminal_or_with_v(image: Path, tmp_path: Path) -> None:
+def test_compiling_is_reported_on_a_terminal_or_with_v(image: Path, tmp_path: Path) -> None:
     options = ("vectorize", image, "-o", image.parent / "a.svg", *QUICK, "--iterations", 1)
     code = "from warp._src.context import Module; Module._compile = lambda *_, **__: exit(9)\n"
     code += f"from warpsplat.cli.main import main; main({[str(o) for o in options]!r} + ARGS)"

@@ -54,7 +54,7 @@ def test_names(
     assert {one["output"] for one in values} == names and all(map(os.path.isfile, names))
 
 
-def test_what_was_made_before_a_stop_is_whole(image: Path, tmp_path: Path) -> None:
+def test_results_made_before_a_stop_are_complete(image: Path, tmp_path: Path) -> None:
     """The second run is stopped: its file is there as it was then, the third is none."""
     outputs = [tmp_path / f"{number}.svg" for number in (3, 6, 9)]
     done: list[warpsplat.Result] = []
@@ -169,7 +169,7 @@ def test_more_shapes_than_are_worth_it_are_not_suggested(
     assert chosen == curves and words in why
 
 
-def test_of_a_drawing_the_picture_says_the_number(tmp_path: Path, cli: Cli) -> None:
+def test_no_number_is_suggested_for_a_drawing(tmp_path: Path, cli: Cli) -> None:
     path = tmp_path / "cells.png"
     Image.fromarray(np.kron(np.eye(8, dtype=np.uint8) * 255, np.ones((4, 4), np.uint8))).save(path)
     said = cli("vectorize", path, "--suggest").out

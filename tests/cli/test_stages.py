@@ -112,7 +112,7 @@ def test_a_signal_at_a_stage(
         (signal.SIGINT, "scoring", True),
     ],
 )
-def test_what_is_there_is_written(
+def test_the_best_so_far_is_written_and_marked(
     forks: Forks, tmp_path: Path, number: signal.Signals, moment: str, finished: bool
 ) -> None:
     arguments = [*lay_out(tmp_path, "vectorize"), "--json"]
@@ -130,7 +130,7 @@ def test_what_is_there_is_written(
 
 
 @pytest.mark.parametrize(("number", "times"), [(signal.SIGTERM, 1), (signal.SIGINT, 2)])
-def test_with_nothing_to_save_nothing_is_written(
+def test_nothing_is_written_without_results(
     forks: Forks, tmp_path: Path, number: signal.Signals, times: int
 ) -> None:
     """A second signal ends the process at once, even where there would be something."""

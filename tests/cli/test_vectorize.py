@@ -44,7 +44,7 @@ def test_summary_and_default_output(
     assert captured.err == "", "no progress bar where stderr is no terminal"
 
 
-def test_what_only_the_work_finds_out_names_the_image(tmp_path: Path, cli: Cli) -> None:
+def test_errors_during_a_run_name_the_image(tmp_path: Path, cli: Cli) -> None:
     path = tmp_path / "white.png"
     Image.fromarray(np.full((40, 40, 3), 255, np.uint8)).save(path)
     said = cli(
@@ -120,7 +120,7 @@ def test_data_uri(image: Path, tmp_path: Path, cli: Cli) -> None:
         (["--shape", "circle"], "shape circle asks for fitted shapes"),
     ],
 )
-def test_a_line_says_what_an_option_does_to_a_drawing(
+def test_the_effect_of_an_option_on_a_drawing_is_reported(
     tmp_path: Path, cli: Cli, options: list[str], said: str
 ) -> None:
     path = tmp_path / "logo.png"

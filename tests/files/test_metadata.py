@@ -136,7 +136,7 @@ def test_sides_are_those_of_the_upright_image(form: str) -> None:
     assert stated(form, exif=exif(254, 127, orientation=3)) == (254, 127)
 
 
-def test_what_is_none() -> None:
+def test_files_without_a_resolution() -> None:
     assert stated("PNG") is None
     assert stated("GIF") is None
     assert stated("JPEG", exif=exif(72, 72)) is None, "what EXIF prescribes where none is known"

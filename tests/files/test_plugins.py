@@ -40,7 +40,7 @@ def halves() -> Image.Image:
 
 
 @each
-def test_what_it_shows(plugin: Plugin) -> None:
+def test_colours_are_read(plugin: Plugin) -> None:
     found = image_of(saved(plugin, halves()))
     assert found.shape == (24, 40, 3)
     np.testing.assert_allclose(found, np.asarray(halves()) / 255, atol=8 / 255)

@@ -127,7 +127,7 @@ FAILURES = {
 
 
 @pytest.mark.parametrize("failure", FAILURES)
-def test_failures_are_said_and_change_nothing(stand_in: Path, failure: str) -> None:
+def test_failures_are_reported_and_change_nothing(stand_in: Path, failure: str) -> None:
     inner, message = FAILURES[failure]
     path = stand_in.parent / "document.svg"
     path.write_text(document(image(name="first") + inner), "utf-8")
@@ -178,7 +178,7 @@ def test_it_is_installed_and_removed(tmp_path: Path, capfd: pytest.CaptureFixtur
     assert [path.name for path in folder.iterdir()] == ["other.py"]
 
 
-def test_files_of_others_stay(tmp_path: Path, cli: Cli) -> None:
+def test_foreign_files_are_not_replaced_or_removed(tmp_path: Path, cli: Cli) -> None:
     other = tmp_path / FILES[1]
     other.write_text("another")
     for words in ((), ("--remove",)):
@@ -199,7 +199,7 @@ def test_the_folder_without_inkscape(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert command.data_folder().name == "inkscape"
 
 
-def test_the_dialog_offers_what_there_is() -> None:
+def test_the_dialog_offers_all_subjects() -> None:
     """Its parameters become arguments of the script, by their names."""
     root = ElementTree.parse(SOURCE / FILES[1]).getroot()
     space = root.tag.partition("}")[0] + "}"

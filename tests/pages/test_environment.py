@@ -44,7 +44,7 @@ def test_texts_add_no_element_and_no_attribute(name: str) -> None:
     assert unquote_to_bytes(link) == name.encode("utf-8", "surrogateescape")
 
 
-def test_what_a_page_loads() -> None:
+def test_a_page_loads_nothing_from_elsewhere() -> None:
     """Only our scripts run, nothing is loaded from elsewhere, and the mark is near the start."""
     text = page("test.html.j2", assets=("viewer.css", "viewer.js"), name="x")
     assert "default-src &#39;none&#39;" in text and "script-src &#39;sha256-" in text

@@ -29,7 +29,7 @@ def test_vectorize_refine_and_eval(image: Path, tmp_path: Path, cli: Cli) -> Non
 
 
 @pytest.mark.parametrize("place", ["photo.png", "a.svg", "a.txt", "-", "other.html", "no/a.html"])
-def test_where_a_report_cannot_be(
+def test_invalid_places_of_a_report(
     place: str, image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "other.html").write_text("<p>mine</p>")
@@ -63,7 +63,7 @@ def test_several_images_have_a_list(image: Path, tmp_path: Path) -> None:
         ("", "index.html: exists and was not written by warpsplat"),
     ],
 )
-def test_a_batch_s_report_takes_no_other_file_s_place(
+def test_a_report_of_a_batch_replaces_no_other_file(
     image: Path, tmp_path: Path, cli: Cli, report: str, said: str
 ) -> None:
     for name in ("notes.txt", "index.html"):

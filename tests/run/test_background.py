@@ -73,7 +73,7 @@ def test_none_is_a_background_that_is_removed_outside() -> None:
     assert made(image, "drawing", background="none") == made(image, "drawing", remove_background="outside")
 
 
-def test_another_background() -> None:
+def test_a_background_in_place_of_the_removed_one() -> None:
     result = made(drawn(RING, 64, 64), "drawing", remove_background="everywhere", background="#8cf")
     shown = np.asarray(render_own(result.svg).convert("RGB"))
     assert shown[0, 0].tolist() == shown[32, 20].tolist() == [0x88, 0xCC, 0xFF]
@@ -100,7 +100,7 @@ def test_a_palette_is_not_for_a_background_that_is_left_out(quality: str) -> Non
 
 
 @pytest.mark.parametrize(("width", "noted"), [("2", False), ("40", True)])
-def test_bridges_that_are_wider_than_what_they_hold(width: str, noted: bool) -> None:
+def test_bridges_wider_than_their_parts_are_reported(width: str, noted: bool) -> None:
     result = made(drawn(RING, 64, 64), "drawing", quality="draft", bridges=width)
     assert any("left out, as stencils have none" in note for note in result.notes)
     assert ("bridges are wider than 1 of the 1 part" in result.notes[-1]) == noted

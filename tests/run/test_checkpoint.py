@@ -99,7 +99,7 @@ FLAT = np.repeat(np.repeat(np.float32([[[1, 0, 0], [0, 0, 1]]]), 12, axis=0), 8,
 
 
 @pytest.mark.parametrize("given", [{"subject": "drawing", "image": FLAT}, {"time_budget": 30}])
-def test_what_has_no_state_begins_again(
+def test_runs_without_checkpoints_start_from_the_beginning(
     tmp_path: Path, given: dict[str, Any], caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "run.checkpoint"
@@ -127,7 +127,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ({"settings": warpsplat.make_settings(curves=10, rates={"points": 2.0})}, "differs"),
     ],
 )
-def test_another_run_is_refused(saved: Path, given: dict[str, Any], cause: str) -> None:
+def test_a_checkpoint_of_another_run_is_refused(saved: Path, given: dict[str, Any], cause: str) -> None:
     if "settings" in given:
         given |= dict.fromkeys(("curves", "iterations", "seed", "subject"))
     with pytest.raises(UsageError, match=rf"run\.checkpoint: .*{cause}"):
@@ -194,7 +194,9 @@ def test_damage_is_one_line(saved: Path, tmp_path: Path, change: Any, cause: str
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
-def test_another_device_is_said(saved: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_checkpoint_of_another_device(
+    saved: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     path = changed(saved, tmp_path / "run.checkpoint", at("device", value="another"))
     fitted(checkpoint=path, resume=True, stop=lambda: True)
     assert "its bytes will differ" in caplog.text

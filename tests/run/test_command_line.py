@@ -63,13 +63,13 @@ def test_the_line_gives_the_settings(given: dict[str, Any]) -> None:
     assert settings_of(line.replace("'-odd; name.png'", "x.png")) == settings
 
 
-def test_it_says_no_more_than_is_needed() -> None:
+def test_defaults_are_left_out_of_the_command() -> None:
     assert vectorize_command(make_settings(), "a.png", "a.svg") == "warpsplat vectorize a.png -o a.svg"
     line = vectorize_command(make_settings("draft", curves=9), "a b.png", "a.svg")
     assert line == "warpsplat vectorize 'a b.png' --quality draft --curves 9 -o a.svg"
 
 
-def test_what_no_flag_says_is_told() -> None:
+def test_settings_without_a_flag_are_mentioned() -> None:
     assert vectorize_command(make_settings(bending=0.1), "a.png", "a.svg").endswith(
         "# and settings without a flag"
     )
@@ -87,7 +87,7 @@ def test_a_preset_is_named(preset: str, further: dict[str, Any]) -> None:
     assert f"--preset {preset}" in line and len(shlex.split(line)) <= 7 + 2 * len(further)
 
 
-def test_what_a_preset_sets_and_no_flag_takes_back() -> None:
+def test_a_preset_that_no_flag_can_undo_is_not_named() -> None:
     """The preset is not named then."""
     settings = make_settings(shape="triangle", curves=250, opaque=False)
     line = vectorize_command(settings, "x.png", "out.svg", preset="low-poly")
@@ -121,7 +121,7 @@ def test_flags_keys_keywords_and_rows(option: Option) -> None:
     assert f"<code>--{option.name}" in MADE["tables"]("options")
 
 
-def test_what_is_made_is_current() -> None:
+def test_generated_files_are_current() -> None:
     assert MADE["TYPED"].read_text("utf-8") == MADE["typed_options"](), "python docs/option_tables.py"
     rows = MADE["tables"]("research")
     assert all(

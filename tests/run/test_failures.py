@@ -64,7 +64,7 @@ def fail(monkeypatch: pytest.MonkeyPatch) -> Fail:
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_what_was_read_back_last_makes_the_file(name: str, fail: Fail, tmp_path: Path) -> None:
+def test_the_shapes_read_back_last_make_the_file(name: str, fail: Fail, tmp_path: Path) -> None:
     fail(52)
     output = tmp_path / "out.svg"
     with pytest.raises(DeviceError, match=r"failed: unspecified launch failure .CUDA error 719.") as caught:
@@ -86,7 +86,7 @@ def test_shapes_that_can_still_be_read_are(fail: Fail) -> None:
 
 
 @pytest.mark.parametrize("run", [fitted, refined])
-def test_what_follows_the_fit_may_fail_too(run: Make, fail: Fail, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failures_after_a_fit_keep_it(run: Make, fail: Fail, monkeypatch: pytest.MonkeyPatch) -> None:
     """Then the fit is whole, but for the pixels that should be empty."""
     fail(-1)
 
@@ -100,7 +100,7 @@ def test_what_follows_the_fit_may_fail_too(run: Make, fail: Fail, monkeypatch: p
     assert caught.value.result.iterations == 56
 
 
-def test_of_a_drawing_the_trace_is_left(fail: Fail, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_drawings_keep_their_trace(fail: Fail, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     fail(-1)
 
     def refused(*_: Any) -> None:

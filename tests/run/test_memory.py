@@ -87,7 +87,7 @@ def test_the_size_is_the_largest_within_the_limit() -> None:
         factor_for(HUGE, make_settings(max_memory="1MB"), "huge.jpg")
 
 
-def test_without_a_limit_it_is_the_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_machine_s_memory_is_the_default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     for found, processes, limit in ((10**9, 1, 9 * 10**8), (10**9, 3, 3 * 10**8), (None, 1, None)):
         monkeypatch.setattr(memory, "machine_memory", lambda found=found: found)
         monkeypatch.setattr(memory.Sharing, "processes", processes)
@@ -199,7 +199,7 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image() -> None:
         assert words in made.reduced and bool(words) == bool(made.reduced)
 
 
-def test_refining_against_what_takes_too_much_is_refused(
+def test_refining_against_a_too_large_image_is_refused(
     tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before its pixels are read."""
@@ -260,7 +260,7 @@ def test_the_memory_of_a_gpu_limits_the_size_too() -> None:
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
-def test_what_needs_no_device_starts_none(quality: str) -> None:
+def test_only_the_draft_of_a_drawing_starts_no_device(quality: str) -> None:
     """The draft of a drawing is traced on the host, so that no GPU limits its size."""
     started: list[int] = []
 

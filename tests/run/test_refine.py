@@ -129,7 +129,7 @@ def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) ->
     np.testing.assert_allclose(views[1] / views[1][2], views[0] / views[0][2], atol=1e-5)
 
 
-def test_what_has_margins_of_its_own_is_all_picture(device: str) -> None:
+def test_margins_of_a_foreign_file_are_part_of_the_picture(device: str) -> None:
     """The file looks like one on a sheet, but was not written by warpsplat."""
     head = '<svg xmlns="http://www.w3.org/2000/svg" width="24px" height="24px" viewBox="-2 -2 24 24">'
     text = f'{head}<rect x="-2" y="-2" width="24" height="24"/><path d="M0 0h9v9z" fill="red"/></svg>'
@@ -139,7 +139,7 @@ def test_what_has_margins_of_its_own_is_all_picture(device: str) -> None:
     assert before == pytest.approx(score_svg(text, target).psnr)
 
 
-def test_what_lies_around_kept_elements_is_fitted_to_what_is_seen(device: str) -> None:
+def test_paths_around_kept_elements_are_fitted(device: str) -> None:
     """Below them, in front of them, and out of sight, where it stays as it is."""
     target = (on_white(render_svg(FILTERED)) / 255).astype(np.float32)
     moved = FILTERED.replace("M3 4h14v22h-14z", "M5 6h12v18h-12z").replace("M14 12h20v14z", "M18 13h13v10z")
@@ -153,7 +153,7 @@ def test_what_lies_around_kept_elements_is_fitted_to_what_is_seen(device: str) -
     np.testing.assert_allclose(result.scene.points_of(1), before_it.points_of(1), atol=1)
 
 
-def test_what_blends_is_seen_as_well(device: str) -> None:
+def test_paths_below_a_blended_element_are_fitted(device: str) -> None:
     """Paths are fitted below an element that is multiplied with them."""
     blend = '<path d="M8 2h24v26h-24z" fill="#fa0" style="mix-blend-mode:multiply"/>'
     text = f'{HEAD}width="40" height="30"><rect width="40" height="30" fill="#eee"/>%s{blend}</svg>'

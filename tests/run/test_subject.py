@@ -34,7 +34,7 @@ def eight_bits(image: FloatArray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shown", IMAGES)
-def test_what_is_not_asked_for_needs_no_note(shown: str) -> None:
+def test_default_options_need_no_note(shown: str) -> None:
     settings, why, notes = choose_subject(
         IMAGES[shown], make_settings("draft" if shown == "drawing" else "balanced")
     )
@@ -183,7 +183,9 @@ def test_a_drawing_that_shows_little_is_fitted(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     "given", [{"colors": 2}, {"max_bytes": 400}, {"detail": 0.0}, {"subject": "drawing"}]
 )
-def test_what_was_asked_for_is_kept(given: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_requested_subjects_and_options_of_drawings_are_kept(
+    given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(prepare, "guess_subject", lambda target: Guess("drawing", "it was drawn"))
     assert warpsplat.vectorize(soft_stroke(), quality="draft", device="cpu", **given).subject == "drawing"
 

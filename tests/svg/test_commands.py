@@ -70,7 +70,7 @@ def test_no_other_text_is_shorter(seed: int) -> None:
     assert len(shortest(pen, chain)) == min(map(len, every_text(pen, chain)))
 
 
-def test_a_ring_begins_where_it_is_short() -> None:
+def test_a_closed_outline_begins_where_its_text_is_short() -> None:
     """At one of the better quarter of its starts."""
     chain = segments(3, 40)
     chain.append(Segment(chain[-1].end, None, chain[0].start))

@@ -55,7 +55,7 @@ def test_equal_outlines_are_written_once() -> None:
     assert write_svg(back, per_pixel=10, symbols=True).count("<use ") == 5
 
 
-def test_what_is_shorter_stays() -> None:
+def test_single_outlines_and_discs_are_not_shared() -> None:
     """Outlines that occur once, and discs, which an element describes."""
     scene = drawing(Canvas(80, 56, WHITE), (RED, [star(20, 20, 9, 5)]), (BLUE, [disc(60, 30, 5)])).scene
     assert "<use" not in write_svg(rounded(scene, 10), per_pixel=10, symbols=True)

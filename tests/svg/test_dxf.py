@@ -130,7 +130,7 @@ def test_the_size_is_that_of_the_svg(size: str, width: float) -> None:
         ('<path d="M1 1H9V9z" fill="red" fill-opacity=".3"/>', [("FF0000", True)]),
     ],
 )
-def test_what_becomes_an_entity(shapes: str, expected: list[tuple[str, bool]]) -> None:
+def test_which_shapes_become_entities(shapes: str, expected: list[tuple[str, bool]]) -> None:
     entities = read(f'{HEAD}width="10" height="10">{shapes}</svg>').modelspace()
     assert [(e.dxf.layer, is_closed(e)) for e in entities] == expected
 
@@ -169,7 +169,7 @@ def test_a_background_on_a_sheet_is_left_out() -> None:
     )  # margins are in whole units
 
 
-def test_what_changes_the_look_of_edges_only_is_accepted() -> None:
+def test_attributes_that_change_only_edges_are_accepted() -> None:
     """Pixel art on a sheet, and strokes of an image with other resolutions along than down."""
     text = (
         f'{HEAD}width="20" height="10" viewBox="0 0 7 7" preserveAspectRatio="none" '

@@ -90,7 +90,7 @@ def test_bench_against_another_copy(tmp_path: Path, cli: Cli) -> None:
     ("other", "message"),
     [("nothing/like/it", "is no device"), (".", "no folder with a warpsplat"), ("cuda:77", "cuda:77")],
 )
-def test_bench_against_what_there_is_not(
+def test_bench_against_a_missing_copy_or_device(
     other: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     monkeypatch.chdir(tmp_path)

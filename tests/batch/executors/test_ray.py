@@ -97,7 +97,7 @@ CPU, BOTH = {"CPU": 4.0}, {"CPU": 4.0, "GPU": 1.0}
         (BOTH, "cpu", "cpu", (2, 0.0)),
     ],
 )
-def test_actors_declare_what_tasks_take(
+def test_actors_declare_the_resources_of_their_tasks(
     ray: FakeRay, tasks: list[Task], node: dict[str, float], name: str, chosen: str, taken: tuple[int, float]
 ) -> None:
     ray.all, ray.free = [dict(node)], [dict(node)]

@@ -123,7 +123,7 @@ def test_presets(visitor: Visitor) -> None:
     assert visitor.client.get(visitor.at("runs", run, "result.svg")).text == made.svg
 
 
-def test_what_is_saved(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_formats_of_saved_results(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
     run = visitor.over(visitor.begin(visitor.upload(picture()), **SHORT))["id"]
     svg = visitor.client.get(visitor.at("runs", run, "result.svg")).text
 

@@ -95,7 +95,7 @@ def test_without_its_packages(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None
     assert cli("serve", code=2).line.endswith('; pip install "warpsplat[serve]" installs it')
 
 
-def test_a_host_that_other_machines_reach_prints_a_warning(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_public_host_is_warned_of(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module.WarpsplatServer, "run", lambda *_: None)
     said = cli("serve", "--port", 0, "--host", "0.0.0.0", "--device", "cpu").line
     assert said.startswith("warpsplat: --host 0.0.0.0: others can reach it")
