@@ -1,14 +1,9 @@
-"""Properties that must hold for any input, on inputs from hypothesis."""
+"""SVGs from hypothesis, of features that ``refine`` supports and of others, look the same once read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
-import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fuzz.vocabulary import (
@@ -21,26 +16,12 @@ from tests.fuzz.vocabulary import (
     WIDTH,
 )
 from warpsplat.errors import ImageError, explain
-from warpsplat.extensions import renderer_names
-from warpsplat.fit.options import parse_bytes, parse_duration
-from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import psnr
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 from warpsplat.svg.write import write_svg
 
 pytestmark = pytest.mark.slow
-
-
-def examples(count: int) -> Callable[[Any], Any]:
-    """Use the same ``count`` examples on every run, and store none."""
-    return settings(
-        max_examples=count,
-        derandomize=True,
-        database=None,
-        deadline=None,
-        suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
-    )
 
 
 numbers = st.integers(-4, 36).map(str)
@@ -128,58 +109,7 @@ drawings = st.builds(
 """A few shapes in one group."""
 
 
-SECONDS = {"ms": 0.001, "s": 1, "": 1, "m": 60, "h": 3600}
-BYTES = {"": 1, "B": 1, "kB": 1e3, "KiB": 2**10, "MB": 1e6, "MiB": 2**20, "GB": 1e9}
-
-
-@pytest.mark.parametrize("blank", ["", " ", "\t"])
-@pytest.mark.parametrize("number", [0, 7, 1500])
-def test_units_of_durations_and_sizes(number: int, blank: str) -> None:
-    for duration, seconds in SECONDS.items():
-        assert parse_duration(f"{number}{blank}{duration}") == pytest.approx(number * seconds)
-    for size, count in BYTES.items():
-        assert parse_bytes(f"{number}{blank}{size}") == number * count
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("batch")
-    (path / "a.png").touch()
-    return path
-
-
-options = st.fixed_dictionaries(
-    {},
-    optional={
-        "curves": st.integers(1, 100_000),
-        "iterations": st.integers(1, 1_000_000),
-        "seed": st.integers(0, 2**32 - 1),
-        "precision": st.integers(0, 6),
-        "renderer": st.sampled_from([name for name in renderer_names() if name != "gaussian"]),
-        "quality": st.sampled_from(["draft", "balanced", "high"]),
-        "target-psnr": st.floats(1, 99, allow_nan=False).map(lambda x: round(x, 3)),
-        "time-budget": st.integers(1, 500).map("{}s".format),
-        "max-bytes": st.integers(1, 500).map("{}KB".format),
-    },
-)
-
-
-@pytest.mark.needs("batch")
-@examples(50)
-@given(options, options)
-def test_settings_of_a_batch_are_those_of_the_flags(
-    folder: Path, defaults: dict[str, Any], own: dict[str, Any]
-) -> None:
-    from tests.batch.helpers import load_jobs
-
-    path = folder / "jobs.yaml"
-    path.write_text(yaml.safe_dump({"defaults": defaults, "jobs": [{"images": "a.png", **own}]}))
-    flags = {key.replace("-", "_"): value for key, value in {**defaults, **own}.items()}
-    expected: Settings = make_settings(flags.pop("quality", "balanced"), **flags)
-    assert load_jobs(path)[0].settings == expected
-
-
-@examples(120)
+@settings(max_examples=120, derandomize=True, database=None, deadline=None)
 @given(drawings)
 def test_a_drawing_is_held_as_it_looks_or_refused(text: str) -> None:
     """The scene that ``refine`` starts from looks as the SVG."""

@@ -11,11 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from tests.batch.executors.fake_ray import FakeRay
+from tests.batch.helpers import make_tasks
 from warpsplat.batch.executors import ray as module
 from warpsplat.batch.executors import ray_connection, ray_worker, work, workers
 from warpsplat.batch.executors.local import Serial
@@ -51,14 +50,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def tasks(tmp_path: Path) -> list[Task]:
-    rng = np.random.default_rng(0)
-    found = []
-    for i in range(6):
-        path = tmp_path / f"{i}.png"
-        Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        task = Task(i, "key", path.read_bytes(), path.name, str(tmp_path / f"{i}.svg"), SETTINGS, "cpu")
-        found.append(task)
-    return found
+    return make_tasks(tmp_path, 6, SETTINGS)
 
 
 def run(executor: RayCluster, tasks: Iterable[Task], stop: Stop = lambda: False) -> list[Outcome]:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
+from tests.batch.helpers import make_tasks
 from warpsplat.batch.executors.local import Serial
 from warpsplat.batch.executors.ray import RayCluster
-from warpsplat.batch.executors.tasks import Executor, Outcome, Task
+from warpsplat.batch.executors.tasks import Executor, Outcome
 from warpsplat.fit.settings import make_settings
 
 pytest.importorskip("ray")
@@ -23,18 +21,10 @@ pytestmark = [
 ]
 
 
-def tasks(folder: Path) -> Iterator[Task]:
-    rng = np.random.default_rng(0)
-    settings = make_settings("draft", curves=4, iterations=8)
-    for i in range(4):
-        path = folder / f"{i}.png"
-        Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
-        yield Task(i, "key", path.read_bytes(), path.name, f"{i}.svg", settings, "cpu", 1)
-
-
 def results(executor: Executor, folder: Path) -> dict[int, bytes | None]:
+    tasks = make_tasks(folder, 4, make_settings("draft", curves=4, iterations=8), 1)
     with executor:
-        found: list[Outcome] = list(executor.run(tasks(folder), lambda: False, lambda number, part: None))
+        found: list[Outcome] = list(executor.run(tasks, lambda: False, lambda number, part: None))
     assert len(found) == 4
     return {outcome.number: outcome.data for outcome in found}
 
