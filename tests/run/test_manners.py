@@ -6,7 +6,6 @@ import base64
 import dataclasses
 import inspect
 import math
-import pydoc
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -94,17 +93,6 @@ def test_help_describes_every_field(cls: Any) -> None:
     text = inspect.getdoc(cls) or ""
     for field in dataclasses.fields(cls):
         assert re.search(rf"^    {field.name}: \S", text, re.MULTILINE), field.name
-
-
-def test_help_describes_settings_as_the_command_line_does() -> None:
-    assert "    curves: Number of shapes; with a goal, the maximum." in (warpsplat.Settings.__doc__ or "")
-
-
-def test_help_begins_with_the_calls_that_matter() -> None:
-    text = pydoc.plain(pydoc.render_doc(warpsplat))
-    beginning = "\n".join(text.splitlines()[:16])
-    for name in ("vectorize", "refine", "load_svg", "save_svg", "render", "score"):
-        assert name in beginning
 
 
 def test_a_result_spares_files_of_others_if_it_is_told_to(tmp_path: Path) -> None:
