@@ -1,10 +1,9 @@
-"""Runs of the command line, in this process or by a shell."""
+"""Runs of the command line, in this process or another."""
 
 from __future__ import annotations
 
 import json
 import os
-import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -55,16 +54,11 @@ def one_line(text: str) -> str:
     return lines[0]
 
 
-def shell(
-    script: str, *arguments: object, given: bytes = b"", **environment: str
+def python(
+    *arguments: object, given: bytes = b"", folder: str | None = None, **environment: str
 ) -> subprocess.CompletedProcess[bytes]:
-    """Run ``warpsplat`` as a shell does; ``$W`` is the program with the arguments."""
-    command = shlex.join([sys.executable, "-m", "warpsplat", *map(str, arguments)])
+    """Run Python in a process of its own."""
+    command, more = [sys.executable, *map(str, arguments)], os.environ | environment
     return subprocess.run(
-        ["sh", "-c", script.replace("$W", command)],
-        input=given,
-        capture_output=True,
-        timeout=120,
-        check=False,
-        env=os.environ | environment,
+        command, input=given, cwd=folder, env=more, capture_output=True, timeout=120, check=False
     )

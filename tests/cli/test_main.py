@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import os
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,7 +12,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.cli.helpers import QUICK, Cli, one_line
+from tests.cli.helpers import QUICK, Cli, one_line, python
 from tests.forks import CLOSED, Forks
 from warpsplat.cli.echo import notices
 from warpsplat.cli.main import COMMANDS, json_stream, report_error
@@ -47,16 +46,10 @@ def test_help_is_quick_and_heavy_libraries_stay_out(
         f"import sys; from warpsplat.cli.main import main\ntry: main({arguments})\n"
         f"except SystemExit as e: assert not e.code\nassert not {heavy} & set(sys.modules)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-c", code, **environment)
     assert done.returncode == 0, done.stderr
-    assert all(word in done.stdout for word in words)
-    assert "\\b" not in done.stdout
+    shown = done.stdout.decode()
+    assert all(word in shown for word in words) and "\\b" not in shown
 
 
 @pytest.mark.slow

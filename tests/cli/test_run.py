@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.helpers import QUICK, Cli, run
+from tests.cli.helpers import QUICK, Cli, python, run
 from tests.runs import vectorize
 from warpsplat.cli.run import Bar
 from warpsplat.fit.progress import Progress
@@ -87,15 +87,10 @@ def test_compiling_is_reported_on_a_terminal_or_with_v(image: Path, tmp_path: Pa
     code = "from warp._src.context import Module; Module._compile = lambda *_, **__: exit(9)\n"
     code += f"from warpsplat.cli.main import main; main({[str(o) for o in options]!r} + ARGS)"
     for arguments, said in (([], False), (["-v"], True)):
-        done = subprocess.run(
-            [sys.executable, "-c", code.replace("ARGS", repr(arguments))],
-            env=os.environ | {"WARP_CACHE_PATH": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        cache = str(tmp_path / "cache")
+        done = python("-c", code.replace("ARGS", repr(arguments)), WARP_CACHE_PATH=cache)
         assert done.returncode == 9
-        assert ("compiling kernels" in done.stderr) is said
+        assert (b"compiling kernels" in done.stderr) is said
 
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from PIL import Image
 
 import warpsplat
-from tests.cli.helpers import QUICK, Cli, one_line, run, shell
+from tests.cli.helpers import QUICK, Cli, one_line, python, run
 from tests.drawing.trace.drawings import LOGO, draw, ground
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
@@ -68,11 +67,12 @@ def test_a_link_stays_a_link(image: Path, tmp_path: Path) -> None:
 def test_standard_input_and_output(image: Path) -> None:
     direct = image.parent / "a.svg"
     assert run("vectorize", image, "-o", direct, "-q", *QUICK) == 0
-    piped = shell("cd / && $W", "vectorize", "-", "-o", "-", "--json", *QUICK, given=image.read_bytes())
+    words = ("-m", "warpsplat", "vectorize", "-", "-o", "-", "--json", *QUICK)
+    piped = python(*words, given=image.read_bytes(), folder=str(image.parent))
     assert piped.returncode == 0
     assert piped.stdout == direct.read_bytes()
     assert json.loads(piped.stderr)["bytes"] == len(piped.stdout)
-    assert not os.path.exists("-")
+    assert not (image.parent / "-").exists()
 
 
 def test_importance(image: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
