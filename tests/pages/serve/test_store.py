@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,18 @@ from warpsplat.pages.serve.uploads import Upload, plain_name, read_upload
 
 
 @dataclass
-class Clock:
+class SlowClock:
+    """A clock; reading its shapes takes half a second."""
+
     now: float = 0.0
+    cost: float = 0.5
 
     def __call__(self) -> float:
         return self.now
+
+    def scene(self) -> Any:
+        self.now += self.cost
+        return warpsplat.starting_scene(np.zeros((16, 16, 3), np.float32), 2)
 
 
 @dataclass
@@ -62,7 +69,7 @@ def do(store: Store, svg: str = "<svg/>") -> QueuedRun:
 
 
 def test_everything_is_forgotten_a_while_after_the_page_was_closed() -> None:
-    clock = Clock()
+    clock = SlowClock()
     store = Store(Limits(grace=10), clock)
     image = store.add_upload(upload())
     add(store, image)
@@ -159,22 +166,7 @@ def test_postscript_is_run_by_nothing(programs: list[str]) -> None:
     assert programs == []
 
 
-@dataclass
-class Slow:
-    """A clock, and shapes that take half a second to read."""
-
-    now: float = 0.0
-    cost: float = 0.5
-
-    def __call__(self) -> float:
-        return self.now
-
-    def scene(self) -> Any:
-        self.now += self.cost
-        return warpsplat.starting_scene(np.zeros((16, 16, 3), np.float32), 2)
-
-
-def reports(live: LiveRun, slow: Slow, count: int = 400, step: float = 0.1) -> None:
+def reports(live: LiveRun, slow: SlowClock, count: int = 400, step: float = 0.1) -> None:
     snapshot = Snapshot(slow.scene, lambda: np.zeros((16, 16, 3), np.float32))
     for number in range(1, count + 1):
         slow.now += step
@@ -182,29 +174,10 @@ def reports(live: LiveRun, slow: Slow, count: int = 400, step: float = 0.1) -> N
 
 
 def test_pictures_take_a_small_share_of_the_time() -> None:
-    slow = Slow()
+    slow = SlowClock()
     live = LiveRun(clock=slow)
     reports(live, slow)
     spent = live.number * slow.cost
     assert live.number > 3 and live.picture.startswith(b"<svg")
     assert spent <= SHARE * slow.now + slow.cost  # the first one comes at once
     assert spent > 0.8 * SHARE * slow.now
-
-
-def test_a_draft_is_shown_until_the_run_is_as_good() -> None:
-    slow = Slow(cost=0.0)
-    live = LiveRun(clock=slow)
-    live.begin(is_draft=True)
-    assert live.as_dict()["draft"]
-    draft = warpsplat.vectorize(
-        np.zeros((16, 16, 3), np.uint8), 2, subject="photo", iterations=4, device="cpu"
-    )
-    ends = Progress(4, 4, 21.0, 1.0, 1.0, True, 2)
-    live.show_draft(replace(draft, history=(replace(ends, fine=False, psnr=25.0), ends)))
-    live.begin()
-    assert live.picture == draft.svg.encode() and live.number == 1 and not live.as_dict()["draft"]
-    reports(live, slow, count=9)  # 20 dB
-    assert live.number == 1 and live.as_dict()["work"] == 1
-    live._least[True] = 20.0
-    reports(live, slow, count=9)
-    assert live.number > 1 and live.picture != draft.svg.encode()
