@@ -18,7 +18,7 @@ import warp as wp
 from PIL import Image
 
 from tests import ROOT
-from tests.cli.helpers import MANIFEST, Cli, run
+from tests.cli.helpers import MANIFEST, Cli
 from tests.fuzz.corpus import own_svg
 from warpsplat.errors import ExitCode
 
@@ -122,23 +122,17 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     [pytest.param(c, line, p, id=f"{int(c)}-{line.split()[0]}-{what}") for c, what, line, p in TABLE],
 )
 def test_exit_code(
-    tmp_path: Path,
-    inputs: dict[str, bytes],
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    code: ExitCode,
-    line: str,
-    patch: Patch | None,
+    tmp_path: Path, inputs: dict[str, bytes], cli: Cli, code: ExitCode, line: str, patch: Patch | None
 ) -> None:
     for name, data in inputs.items():
         (tmp_path / name).write_bytes(data)
-    monkeypatch.chdir(tmp_path)
-    with monkeypatch.context() as patched:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(tmp_path)
         if patch:
             patch(patched)
-        assert run(*line.split()) == code
-    said = capfd.readouterr().err
+        said = cli(*line.split(), code=code).err
     assert "Traceback" not in said
+    assert ("goal missed: " in said) == (code == ExitCode.GOAL_MISSED)
     if code not in (ExitCode.DONE, ExitCode.SOME_FAILED) and not line.startswith("batch"):
         assert re.fullmatch(r"\n?warpsplat: .*\n", said), "one line on stderr"
     assert {n: (tmp_path / n).read_bytes() for n in inputs} == inputs, "inputs are as they were"

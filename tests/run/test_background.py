@@ -13,6 +13,7 @@ from PIL import Image
 import warpsplat
 from tests.drawing.trace.line_art import drawn
 from tests.runs import scored
+from warpsplat.errors import UsageError
 from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
@@ -202,3 +203,8 @@ def test_images_as_a_background_asks_for_them() -> None:
     np.testing.assert_allclose(load_target(badge(), "x", "#ff8000")[0, 0], [1, 128 / 255, 0])
     assert load_target(badge(opaque=True), "x", "auto").shape == (48, 48, 3)
     assert (load_target(badge(opaque=True), "x", "none")[..., 3] == 1).all()
+
+
+def test_unknown_ways_of_removal_are_refused() -> None:
+    with pytest.raises(UsageError, match="remove-background must be one of outside, everywhere, not 'all'"):
+        make_settings(remove_background="all")
