@@ -64,6 +64,8 @@ def test_bad_files_give_one_line_with_name_and_cause(tmp_path: Path) -> None:
         assert message.startswith(f"{path}: "), name
         assert "\n" not in message
         assert len(message) > len(str(path)) + 8
+    with pytest.raises(ImageError, match=r"^standard input: not an image"):
+        load_image(b"no image", "standard input")
 
 
 def test_decompression_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
