@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests import ROOT
+from tests import ROOT, make_image
 
 QUICK = ("--device", "cpu", "--curves", "4", "--iterations", "12")
 CLOSED = "-"
@@ -192,15 +192,6 @@ def serve() -> None:
             code = os.waitstatus_to_exitcode(status)
             answer = code, used.ru_utime + used.ru_stime, 1024 * used.ru_maxrss
         print(json.dumps(answer), file=answers, flush=True)
-
-
-def make_image(path: Path, seed: int = 0) -> None:
-    """Save a small picture of random pixels."""
-    import numpy as np  # not above: some tasks start without any library
-    from PIL import Image
-
-    rng = np.random.default_rng(seed)
-    Image.fromarray(rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(path)
 
 
 WARM = (

@@ -16,8 +16,7 @@ import tempfile
 import venv
 from pathlib import Path
 
-from tests import ROOT
-from tests.forks import make_image
+from tests import ROOT, make_image
 from tests.needs import WORDS
 
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
+from tests import make_image
 from tests.batch.helpers import Answers, answers
 from tests.cli.helpers import Cli
 from tests.files.memory_store import store  # noqa: F401
-from tests.forks import make_image
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.forks import make_image
+from tests import make_image
 from warpsplat.batch.executors.tasks import Task
 from warpsplat.batch.layers import Layer
 from warpsplat.batch.plan import BatchJob, plan_jobs

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import make_image
 from tests.cli.helpers import MANIFEST
-from tests.forks import make_image
 from warpsplat.svg.viewer import render_svg
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")

@@ -17,7 +17,7 @@ import pytest
 import warp as wp
 from PIL import Image
 
-from tests import ROOT
+from tests import ROOT, make_image
 from tests.cli.helpers import MANIFEST, Cli
 from tests.fuzz.corpus import own_svg
 from warpsplat.errors import ExitCode
@@ -105,7 +105,7 @@ TABLE: list[tuple[ExitCode, str, str, Patch | None]] = [
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     scratch = tmp_path_factory.mktemp("inputs") / "photo.png"
-    Image.fromarray(np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)).save(scratch)
+    make_image(scratch)
     options = "iterations: 4, curves: 4, device: cpu"
     return {
         "photo.png": scratch.read_bytes(),

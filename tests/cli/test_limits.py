@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.helpers import MANIFEST
-from tests.forks import QUICK, Forks, make_image
+from tests import make_image
+from tests.cli.helpers import MANIFEST, one_line
+from tests.forks import QUICK, Forks
 from tests.fuzz.corpus import own_svg
 
 pytestmark = pytest.mark.slow
@@ -28,11 +29,6 @@ def folder() -> Iterator[Path]:
             f"jobs: [{{images: a.png, output: out, curves: 4, iterations: {QUICK[-1]}, device: cpu}}]"
         )
         yield path
-
-
-def assert_one_line(text: str) -> None:
-    assert text.startswith("warpsplat: "), text
-    assert text.count("\n") == 1, text
 
 
 ROOM = 200
@@ -57,7 +53,7 @@ def test_a_result_that_cannot_be_written(forks: Forks, folder: Path, command: st
         code, out, err = forks.run(WRITING[command].split(), folder, file_size=ROOM)
         assert code == 4, err
     assert out == ""
-    assert_one_line(err)
+    assert one_line(err).startswith("warpsplat: ")
     assert sorted(os.listdir(folder)) == before
 
 
@@ -70,7 +66,7 @@ def test_results_of_a_batch_that_cannot_be_written(forks: Forks, folder: Path) -
     folder.chmod(0o555)
     code, out, err = forks.run(["batch", "jobs.yaml"], folder, rights=False)
     assert code == 2 and out == "", "before any work"
-    assert_one_line(err)
+    assert one_line(err).startswith("warpsplat: ")
     assert "jobs.yaml:1: " in err and "output" in err
 
 
@@ -79,5 +75,5 @@ def test_an_input_without_permission(forks: Forks, folder: Path, name: str) -> N
     (folder / name).chmod(0)
     code, _, err = forks.run(["eval", "a.png", "drawing.svg"], folder, rights=False)
     assert code == 3, err
-    assert_one_line(err)
+    assert one_line(err).startswith("warpsplat: ")
     assert f"{name}: no permission" in err

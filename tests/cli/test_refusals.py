@@ -6,10 +6,9 @@ import json
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
+from tests import make_image
 from tests.cli.helpers import Cli, one_line
 from tests.fuzz.corpus import own_svg
 from warpsplat.cli.main import COMMANDS
@@ -222,9 +221,8 @@ FILES = {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("inputs")
-    pixels = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
     for name in ("photo.png", "foreign.png", "foreign-9.png"):
-        Image.fromarray(pixels).save(path / name)
+        make_image(path / name)
     for name, data in FILES.items():
         (path / name).write_bytes(data)
     (path / "folder.svg").mkdir()

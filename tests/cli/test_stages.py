@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from tests import ROOT
+from tests import ROOT, make_image
 from tests.cli.helpers import MANIFEST
-from tests.forks import MOMENTS, QUICK, Forks, Task, make_image
+from tests.forks import MOMENTS, QUICK, Forks, Task
 from warpsplat.svg.viewer import render_own
 
 pytestmark = pytest.mark.slow
