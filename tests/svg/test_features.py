@@ -50,6 +50,7 @@ STYLE = {
     "important": '<style>path{fill:red!important}</style><path style="fill:blue" d="M2 2h30v20z"/>',
     "strings": '<path style="font-family:\'a;fill:red\';fill:blue" d="M2 2h30v20z"/>',
     "another type": '<style type="text/other">path{fill:red}</style><path d="M2 2h30v20z"/>',
+    "hues": '<path style="/* . */fill:hsl(200,50%,50%)" d="M2 2h30v20z"/>',
     "inherit": '<g fill="red" opacity=".7"><path fill="inherit" opacity="inherit" d="M2 2h30v20z"/></g>',
     "current colour": '<g fill="currentColor" color="red"><path color="#08f" d="M2 2h30v20z"/></g>',
     "units": '<g font-size="10"><rect x="1mm" y=".1in" width="1.5em" height="2ex" font-size="150%"/></g>'
