@@ -26,11 +26,8 @@ def test_crossings_are_found_within_contours_only() -> None:
     square, across = polygon((5, 5), (15, 5), (15, 15), (5, 15)), polygon((10, 10), (20, 10), (20, 20))
     made = drawing(CANVAS, (RED, [bow, square, across, disc(40, 36, 8)]))
     assert crosses(made) == [True, False, True] + [False] * 12
-
-
-def test_a_cubic_may_cross_itself() -> None:
     points = np.array([(10, 30), (40, 5), (0, 5), (30, 30), (28, 34), (12, 34)], float)
-    assert crosses(drawing(CANVAS, (RED, [(points, ROUND * 2)]))) == [True, False]
+    assert crosses(drawing(CANVAS, (RED, [(points, ROUND * 2)]))) == [True, False], "a cubic with itself"
 
 
 def test_only_what_would_cross_is_taken_back() -> None:

@@ -39,10 +39,6 @@ def test_dust_goes_first_and_nothing_else() -> None:
     assert counts[-1] >= 2 + len(SPECKS)
 
 
-def test_a_byte_costs_as_usual_by_default() -> None:
-    assert byte_price(make_settings()) == 1
-
-
 def test_a_run_that_is_over_delivers_the_trace(device: str) -> None:
     traced = trace(dusty())
     run = Run(Backend.on(device), stop=lambda: True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,8 @@ import numpy.typing as npt
 import pytest
 
 import warpsplat
-from warpsplat.drawing import draw
-from warpsplat.drawing.glyph_sheet import GlyphSheet
 from warpsplat.drawing.glyphs import find_glyphs
-from warpsplat.scene import Canvas, FloatArray, Scene
+from warpsplat.scene import Scene
 
 Floats = npt.NDArray[np.float64]
 
@@ -130,18 +127,6 @@ def test_a_limit_that_does_not_bind_changes_nothing(quality: str, limit: dict[st
     assert warpsplat.vectorize(page(), **given, **limit).svg == warpsplat.vectorize(page(), **given).svg
 
 
-def test_glyphs_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    looked: list[int] = []
-
-    def find(image: FloatArray, *, removes_ground: bool) -> tuple[GlyphSheet | None, FloatArray]:
-        looked.append(1)
-        return find_glyphs(image, removes_ground=removes_ground)
-
-    monkeypatch.setattr(draw, "find_glyphs", find)
-    warpsplat.vectorize(page(), subject="drawing", quality="draft", max_bytes=900)
-    assert looked == [1]
-
-
 @pytest.mark.parametrize("limit", [{"curves": 3}, {"colors": 2}, {"max_bytes": 900}])
 def test_a_limit_that_binds_is_kept(limit: dict[str, Any]) -> None:
     made = warpsplat.vectorize(page(), subject="drawing", quality="draft", **limit)
@@ -160,14 +145,3 @@ def test_less_detail_costs_letters_little(quality: str) -> None:
     assert usual.score
     assert less.score
     assert less.score.psnr > usual.score.psnr - 1
-
-
-def test_nothing_drawn_on_a_sheet_adds_nothing() -> None:
-    sheet, _ = find_glyphs(page())
-    assert sheet
-    drawn = sheet.trace().scene
-    nothing = replace(drawn.take(np.zeros(0, np.intp)), canvas=Canvas(96, 96, None))
-    assert sheet.placed(nothing, nothing) is nothing
-    whole = sheet.placed(drawn, nothing)
-    assert whole.canvas is nothing.canvas
-    assert len(whole) == 3

@@ -36,11 +36,8 @@ def test_only_the_gradients_that_are_allowed(paint: Painting, kinds: tuple[str, 
     assert [kind for kind in ("linear", "radial") if f"<{kind}Gradient" in result.svg] == [*kinds]
 
 
-def test_by_default_a_drawing_has_those_worth_their_bytes() -> None:
-    assert made(None).svg == made("auto").svg
-
-
-def test_without_gradients_shading_is_bands() -> None:
-    flat = made("flat")
-    assert len(flat.scene) > len(made("auto").scene)
+def test_shading_without_gradients_is_bands_and_gradients_are_usual() -> None:
+    flat, usual = made("flat"), made("auto")
+    assert len(flat.scene) > len(usual.scene)
     assert flat.score and flat.score.psnr > 25
+    assert made(None).svg == usual.svg

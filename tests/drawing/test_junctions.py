@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.drawing.drawings import vectorized
 from tests.drawing.trace.line_art import TEE, drawn
-from tests.runs import vectorize
 from warpsplat.drawing.junctions import with_junctions
-from warpsplat.fit.settings import make_settings
-from warpsplat.rendering.backend import Backend
 from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.svg.data import straight_cubics
 
@@ -75,10 +73,8 @@ SLANTED = '<path d="M12 12L84 24"/><path d="M40 16.667L56 64"/>'
 @pytest.mark.parametrize("is_grey", [True, False])
 def test_a_line_that_ends_at_another_ends_on_its_centre_line(paths: str, is_grey: bool, device: str) -> None:
     image = drawn(paths)
-    result = vectorize(
-        image if is_grey else np.round(image), make_settings(subject="line"), Backend.on(device)
-    )
-    bar, stem = sorted(map(result.scene.points_of, range(2)), key=lambda points: -float(np.ptp(points[:, 0])))
+    scene = vectorized(image if is_grey else np.round(image), device, "line").scene
+    bar, stem = sorted(map(scene.points_of, range(2)), key=lambda points: -float(np.ptp(points[:, 0])))
     low = stem[stem[:, 1].argmin()]
     first, last = bar[bar[:, 0].argmin()], bar[bar[:, 0].argmax()]
     way = (last - first) / np.hypot(*(last - first))

@@ -5,22 +5,22 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 import warpsplat
-from tests.drawing.trace.line_art import CROSS, TEE, drawn, grown, shown
-from tests.runs import scored, vectorize
+from tests.drawing.drawings import vectorized
+from tests.drawing.trace.drawings import as_file, draw_exactly, ground
+from tests.drawing.trace.line_art import CROSS, PEN, TEE, drawn, grown, shown
+from tests.runs import scored
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.fit.settings import make_settings
-from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 
 
-def lines_of(image: np.ndarray, device: str) -> Result:
-    return vectorize(image, make_settings(subject="line"), Backend.on(device))
+def lines_of(image: np.ndarray, device: str, **options: object) -> Result:
+    return vectorized(image, device, "line", **options)
 
 
 def on_clear(image: np.ndarray) -> np.ndarray:
@@ -50,11 +50,7 @@ def test_a_ring_is_one_closed_stroke_of_its_place_and_width(device: str) -> None
 
 
 def test_jpeg_and_grey_paper(device: str) -> None:
-    image = drawn(TEE, ground="#ccc")
-    ok, data = cv2.imencode(".jpg", (255 * image).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 60])
-    assert ok
-    noisy = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.float32) / 255
-    result = lines_of(noisy, device)
+    result = lines_of(as_file(drawn(TEE, ground="#ccc"), quality=60), device)
     assert len(result.scene) == 2
     assert re.search(r'<rect [^>]*fill="#(c[a-f0-9])\1\1"|<rect [^>]*fill="#ccc"', result.svg)
 
@@ -68,21 +64,18 @@ def test_pens_are_groups_that_say_their_colour(device: str) -> None:
 
 
 def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> None:
-    image = (255 * drawn(CROSS)[..., ::-1]).astype(np.uint8)
-    ok, data = cv2.imencode(".png", image)
-    assert ok
+    image = (255 * drawn(CROSS)).astype(np.uint8)
     for minify in (False, True):
         results = [
             warpsplat.vectorize(
-                data.tobytes(),
+                image,
                 settings=make_settings(subject="line", page=page, minify=minify),
                 device=device,
-                output=tmp_path / f"{len(page)}.svg",
-                name="a.png",
+                output=tmp_path / "a.svg",
             )
             for page in ("", "a4")
         ]
-        text = (tmp_path / "2.svg").read_text()
+        text = (tmp_path / "a.svg").read_text()
         assert text == results[1].svg
         assert 'width="297mm" height="210mm"' in text
         assert scored(results[0]).psnr == scored(results[1]).psnr
@@ -95,7 +88,7 @@ def test_a_sheet_does_not_change_the_figures(device: str, tmp_path: Path) -> Non
 def test_a_given_width_is_that_of_all_strokes(given: dict[str, str], pixels: float, device: str) -> None:
     disc = '<circle cx="24" cy="36" r="14" fill="#000" stroke="none"/>'
     image = drawn(f'{disc}<path d="M50 12V60M70 10V52"/><path d="M88 30V60" stroke-width="5"/>')
-    scene = vectorize(image, make_settings(subject="line", **given), Backend.on(device)).scene
+    scene = lines_of(image, device, **given).scene
     assert scene.widths == pytest.approx(pixels)
     ends = scene.points[np.stack([scene.first[:-1], scene.first[1:] - 1])][:, scene.closed == 0]
     assert sorted(np.ptp(ends, axis=0)[:, 1].round().tolist())[-3:] == [30, 42, 48]
@@ -119,9 +112,8 @@ BLOB = (
 
 
 def test_mixed_line_art_keeps_its_areas(device: str) -> None:
-    fine = drawn(f'<g transform="scale(8)">{BLOB}</g>', 768, 576)
-    image = fine.reshape(72, 8, 96, 8, 3).mean(axis=(1, 3))
-    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
+    image = draw_exactly(f"{ground('#fff', 96, 72)}<g {PEN}>{BLOB}</g>", 96, 72)
+    result = lines_of(image, device, mixed=True)
     assert re.findall(r'<g id="(.*?)">', result.svg) == ["pen-1-000000", "pen-2-cc0000"]
     assert np.bincount(result.scene.kind).tolist() == [1, 2]
     # A circle, although a line begins at it, or with the beginning of the line as exact as it is drawn.
@@ -134,18 +126,13 @@ def test_without_areas_all_is_strokes_a_disc_a_dot_and_the_rest_rings(device: st
     assert len(disc.scene) == 3
     assert scored(disc).psnr > 34
     image = drawn('<path d="M8 12H50V60H8Z" fill="#000" stroke="none"/><path d="M70 8V64M50 36H88"/>')
-    rings = lines_of(image, device)
+    rings, mixed = lines_of(image, device), lines_of(image, device, mixed=True)
     assert (rings.scene.kind == Kind.STROKE).all()
-    mixed = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
     assert scored(mixed).psnr > scored(rings).psnr > 34
     assert 2 * len(mixed.svg) < len(rings.svg)
-
-
-def test_areas_alone_are_fills(device: str) -> None:
-    image = drawn('<circle cx="30" cy="36" r="20" fill="#000"/>')
-    result = vectorize(image, make_settings(subject="line", mixed=True), Backend.on(device))
-    assert result.scene.kind.tolist() == [Kind.FILL]
-    assert scored(result).psnr > 34
+    alone = lines_of(drawn('<circle cx="30" cy="36" r="20" fill="#000"/>'), device, mixed=True)
+    assert alone.scene.kind.tolist() == [Kind.FILL]
+    assert scored(alone).psnr > 34
 
 
 def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:
@@ -156,19 +143,13 @@ def test_a_line_thinner_than_a_pixel_is_one_thin_stroke(device: str) -> None:
 
 
 @pytest.mark.parametrize("radius", [1.5, 4, 8])
-def test_dots_are_strokes_of_no_length(radius: float, device: str) -> None:
-    image = drawn(
-        f'<circle cx="30.3" cy="30.4" r="{radius}" fill="#000" stroke="none"/><path d="M8 60H88M60 10V50"/>'
-    )
-    result = lines_of(image, device)
+@pytest.mark.parametrize("lines", ["", "M8 60H88M60 10V50"])
+def test_dots_are_strokes_of_no_length(lines: str, radius: float, device: str) -> None:
+    dot = f'<circle cx="30.3" cy="30.4" r="{radius}" fill="#000" stroke="none"/>'
+    result = lines_of(drawn(f'{dot}<path d="{lines}"/>'), device)
     assert (result.scene.kind == Kind.STROKE).all()
-    assert len(result.scene) == 3
-    assert scored(result).psnr > 30
-
-
-def test_dots_alone(device: str) -> None:
-    result = lines_of(drawn('<circle cx="30" cy="30" r="6" fill="#000" stroke="none"/>'), device)
-    assert scored(result).psnr > 26
+    assert len(result.scene) == (3 if lines else 1)
+    assert scored(result).psnr > (30 if lines else 26)
 
 
 def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:

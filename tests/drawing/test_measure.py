@@ -10,8 +10,7 @@ import pytest
 from tests.drawing.drawings import BLUE, GOLD, WHITE, disc, drawing, logo, polygon
 from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
-from warpsplat.drawing.measure import pixels_around
-from warpsplat.drawing.model import errors, fitted
+from warpsplat.drawing.model import errors
 from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
@@ -105,24 +104,3 @@ def test_the_normal_equations() -> None:
     matrix = wide.T @ full @ wide + np.diag(added + least)
     want = np.linalg.solve(matrix, -freedom.adjoint(gradient))
     assert np.linalg.norm(wide @ (found - want)) < 0.05 * np.linalg.norm(wide @ want)
-
-
-def test_outlines_follow_their_places() -> None:
-    """Without a render, nearly as far as with one."""
-    made = logo()
-    fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
-    samples = fit.places()
-    before = errors(samples, fit.drawing.cubics()).sum()
-    every = np.arange(len(fit.drawing.scene.starts) - 1)
-    after = fitted(samples, fit.drawing, fit.least, every)
-    assert after[2].sum() < 0.1 * before
-    again = OutlineFit(render(made.scene), after[0], Run(Backend.on("cpu", 1)))
-    assert again.error < 0.15 * fit.error
-
-
-def test_each_cubic_has_the_pixels_around_it() -> None:
-    """A level line of 20 px with a pixel on each side, cut off at the border of the image."""
-    line = np.array([[(10, 20.5), (16, 20.5), (23, 20.5), (30, 20.5)], [(60, 20.5)] * 4], float)
-    cubic, pixel = pixels_around(line, 64, 48)
-    assert np.bincount(cubic).tolist() == [3 * 22, 9]
-    assert sorted(set((pixel[cubic == 0] // 64).tolist())) == [19, 20, 21]

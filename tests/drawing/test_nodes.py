@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, Outline, disc, drawing, logo, polygon, seam
+from tests.drawing.drawings import BLUE, GOLD, RED, WHITE, Outline, disc, drawing, logo, polygon
 from tests.drawing.test_fit_outlines import assert_clean, psnr
 from tests.drawing.trace.test_cubics import halves
 from warpsplat.drawing import prices
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
-from warpsplat.drawing.model import before_fit, errors
-from warpsplat.drawing.nodes import STRAIGHT, WITHOUT, Edits, apart, applied, candidates
+from warpsplat.drawing.model import before_fit
+from warpsplat.drawing.nodes import STRAIGHT, WITHOUT, Edits, applied, candidates
 from warpsplat.drawing.tidy import finish_drawing, tidied
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
@@ -99,43 +99,6 @@ def test_almost_straight_cubics_cost_little() -> None:
     assert growth[0] < 0.01 * growth[1]
     left, _ = applied(made, edits.take(growth < growth.max()))
     assert left.lines().tolist() == [True, False, True, True]
-
-
-def test_chosen_candidates_have_no_cubic_in_common() -> None:
-    made = split(logo())
-    edits = candidates(made, np.zeros((nodes(made), 2), np.bool_))
-    cost = np.random.default_rng(0).random(len(edits.at))
-    chosen = apart(edits, cost)
-    assert 1 < len(chosen) < len(cost)
-    around = [set(row) for row in edits.around.tolist()]
-    taken = list(itertools.chain(*(around[i] for i in chosen)))
-    assert len(taken) == len(set(taken))
-    assert cost.argmin() in chosen
-    assert all(around[i] & set(taken) for i in range(len(cost)))
-
-
-def test_what_was_refused_is_no_candidate() -> None:
-    made = split(logo())
-    refused = np.zeros((nodes(made), 2), np.bool_)
-    edits = candidates(made, refused)
-    refused[edits.at[::2], edits.kind[::2]] = True
-    left = candidates(made, refused)
-    assert list(zip(left.kind, left.at, strict=True)) == list(
-        zip(edits.kind[1::2], edits.at[1::2], strict=True)
-    )
-
-
-def test_what_nothing_changes_costs_nothing() -> None:
-    """The growth is that of the samples on the cubics as they become."""
-    made = split(seam())
-    fit = OutlineFit(render(made.scene), made, Run(Backend.on("cpu", 1)))
-    samples = fit.places()
-    edits = edits_of(made, STRAIGHT)
-    growth = before_fit(samples, made, edits)
-    for i in (0, len(growth) - 1):
-        left, _ = applied(made, edits.take(np.array([i])))
-        want = errors(samples, left.cubics()).sum() - errors(samples, made.cubics()).sum()
-        assert abs(growth[i] - want) < 0.2 * abs(want) + 1e-9
 
 
 def test_a_logo_loses_its_needless_nodes_unless_it_is_a_draft(device: str) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.drawing.drawings import vectorized
 from tests.drawing.trace.line_art import drawn
-from tests.runs import scored, vectorize
-from warpsplat.fit.settings import make_settings
-from warpsplat.rendering.backend import Backend
+from tests.runs import scored
 from warpsplat.run.result import Result
 from warpsplat.scene import Kind
 
@@ -20,8 +19,7 @@ BLUNT = '<path d="M14 36H84" stroke-width="12" stroke-linecap="butt"/>'
 
 
 def strokes_of(paths: str, device: str) -> Result:
-    settings = make_settings(subject="drawing", strokes=True)
-    return vectorize(drawn(paths), settings, Backend.on(device))
+    return vectorized(drawn(paths), device, strokes=True)
 
 
 def test_lines_become_strokes_and_areas_stay_fills(device: str) -> None:

@@ -19,7 +19,7 @@ from tests.drawing.drawings import (
     star,
 )
 from warpsplat.drawing.constraints import Drawing
-from warpsplat.drawing.shapes import FAMILIES, Family, distances, nearest
+from warpsplat.drawing.shapes import FAMILIES, Family, nearest
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
@@ -93,15 +93,6 @@ def test_the_nearest_shape_is_the_one_that_it_was(family: Family, wanted: list[f
     values, off = nearest(family, points[None], np.ones((1, 96)))
     np.testing.assert_allclose(values[0], wanted, atol=0.15)
     assert off[0, 9:].max() < 0.2
-
-
-def test_distances_have_signs() -> None:
-    """From a box with round corners, an ellipse, and a box with sharp ones."""
-    half = np.array([[12.0, 8], [12, 8], [12, 8]])
-    radii = np.array([[3.0, 3], [12, 8], [0, 0]])
-    points = np.array([[(13.0, 0), (0, -9), (9, 6), (11, 0)]] * 3)
-    wanted = [[1, 1, -2, -1], [1, 1, 0.57, -1.04], [1, 1, -2, -1]]
-    np.testing.assert_allclose(distances(points, half, radii), wanted, atol=0.1)
 
 
 def test_equal_outlines_of_a_noisy_image_are_equal() -> None:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import warpsplat
-from warpsplat.drawing.plain_ground import find_ground
 from warpsplat.drawing.silhouette import by_object
-from warpsplat.drawing.without_background import opacity_on_ground, without_ground
+from warpsplat.drawing.without_background import without_ground
 from warpsplat.errors import ImageError
 from warpsplat.portable.filters import gaussian_blur
 from warpsplat.scene import FloatArray
@@ -35,21 +34,6 @@ def photograph(noise: float = 2.0) -> FloatArray:
     image = paper * (1 - cover[..., None]) + np.array([0.25, 0.2, 0.2]) * cover[..., None]
     grain = np.random.default_rng(3).uniform(-1, 1, image.shape) * noise / 255
     return np.clip(image + grain, 0, 1).astype(np.float32)
-
-
-def test_light_and_shadow_are_ground() -> None:
-    found = find_ground(255 * photograph(), everywhere=True)
-    cover = shapes()
-    assert found.mask[cover == 0].mean() > 0.85, "all but what is beside edges"
-    assert not found.mask[cover == 1].any()
-    outside = find_ground(255 * photograph(), everywhere=False)
-    assert found.mask[36, 32]
-    assert not outside.mask[36, 32]
-
-
-def test_edges_are_where_objects_end() -> None:
-    found = opacity_on_ground(photograph(), everywhere=True)
-    assert np.abs(found - shapes()).mean() < 0.006
 
 
 def test_what_is_cut_out_has_its_own_colours() -> None:

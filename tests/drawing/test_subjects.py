@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import warpsplat
+from tests.drawing.drawings import vectorized
 from tests.drawing.trace.drawings import draw
 from tests.drawing.trace.line_art import drawn
-from tests.runs import scored, vectorize
+from tests.runs import scored
 from warpsplat.drawing.picture import LEAST_ORIGINAL_SIDE, Picture
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_svg
@@ -34,11 +34,10 @@ def repeated(image: FloatArray, times: int) -> FloatArray:
 def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> None:
     """The large file shows what the small one does, without the steps of the pixels."""
     small = drawn(DRAWING, 100, 100)
-    settings = make_settings(subject="drawing")
-    large = vectorize(repeated(small, 3), settings, Backend.on(device))
+    large = vectorized(repeated(small, 3), device)
     assert {'width="300"', 'height="300"'} <= set(large.svg.partition(">")[0].split())
     assert (large.scene.canvas.width, large.scene.canvas.height) == (300, 300)
-    plain = vectorize(small, settings, Backend.on(device))
+    plain = vectorized(small, device)
     assert score_svg(large.svg, small, perceptual=False).psnr >= scored(plain).psnr - 0.5
     assert large.scene.points.shape == plain.scene.points.shape
 
@@ -70,7 +69,7 @@ def test_what_is_translucent_leaves_no_opaque_paint_in_few_colours(
     body += (
         '<rect x="6" y="6" width="26" height="42" fill="#06c"/><circle cx="18" cy="24" r="8" fill="#fc0"/>'
     )
-    result = vectorize(draw(body, 64, 64), make_settings(subject="drawing", **given), Backend.on(device))
+    result = vectorized(draw(body, 64, 64), device, **given)
     shown = np.asarray(render_svg(result.svg))
     assert shown[8:46, 8:30, 3].min() == 255, "what is opaque is there"
     assert shown[:, 36:, 3].max() == shown[51:, :, 3].max() == 0

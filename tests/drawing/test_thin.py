@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.runs import scored, vectorize
-from warpsplat.drawing.thin import BEYOND, THIN_SIDE, continued, cut, margins
+from tests.drawing.drawings import vectorized
+from tests.runs import scored
 from warpsplat.fit.settings import make_settings
-from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import choose_subject
 
 
@@ -26,7 +25,7 @@ def flag(width: int, height: int) -> np.ndarray:
 
 
 def psnr_of(image: np.ndarray, subject: str, device: str) -> float:
-    result = vectorize(image, make_settings(subject=subject), Backend.on(device))
+    result = vectorized(image, device, subject)
     assert (result.scene.canvas.width, result.scene.canvas.height) == image.shape[1::-1]
     return scored(result).psnr
 
@@ -38,7 +37,7 @@ def test_a_drawing(size: tuple[int, int], device: str) -> None:
 
 @pytest.mark.parametrize("height", [1, 2])
 def test_a_ramp_is_one_gradient(height: int, device: str) -> None:
-    result = vectorize(ramp(60, height), make_settings(subject="drawing"), Backend.on(device))
+    result = vectorized(ramp(60, height), device)
     assert len(result.scene) == 1
     assert scored(result).psnr > 40
 
@@ -54,15 +53,3 @@ def test_lines_across(device: str) -> None:
     image[:, 3::14] = 0
     image[:, 4::14] = 0
     assert psnr_of(image, "line", device) > 20
-
-
-def test_what_is_continued_is_cut_again() -> None:
-    image = ramp(30, 3)
-    across, down = margins(image, THIN_SIDE)
-    assert (across, down) == (0, BEYOND)
-    wide = continued(image, across, down)
-    assert wide.shape == (3 + 2 * BEYOND, 30, 3) and (wide[:BEYOND] == image[0]).all()
-    made = vectorize(wide, make_settings(subject="drawing"), Backend.on("cpu")).scene
-    small = cut(made, across, down)
-    assert (small.canvas.width, small.canvas.height) == (30, 3)
-    np.testing.assert_allclose(small.points, made.points - (0, BEYOND))

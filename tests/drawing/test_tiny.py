@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import warpsplat
-from warpsplat.drawing.strokes.broad import pen_width
 from warpsplat.errors import ImageError
 from warpsplat.fit.settings import Subject
 
@@ -40,7 +39,3 @@ def test_line_art_may_have_no_lines() -> None:
     for image in IMAGES.values():
         with contextlib.suppress(ImageError):
             assert warpsplat.vectorize(image, subject="line", quality="draft").score
-
-
-def test_a_mask_without_a_pixel_outside_has_a_width() -> None:
-    assert 1 <= pen_width(np.ones((3, 3), np.bool_)) < 24

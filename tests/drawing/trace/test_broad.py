@@ -10,31 +10,7 @@ from warpsplat.drawing.strokes.broad import split
 from warpsplat.drawing.strokes.ink import find_ink
 from warpsplat.drawing.strokes.lines import trace_ink
 
-BLOB = '<circle cx="30" cy="36" r="16" fill="#000"/><path d="M30 36H88"/>'
 STAR = '<path d="M30 8l7 21h22l-18 13 7 21-18-13-18 13 7-21L1 29h22z" fill="#000" stroke="none"/>'
-
-
-def test_lines_alone_have_no_areas() -> None:
-    ink = find_ink(drawn('<path d="M10 20H86"/><path d="M48 20V62"/>'))
-    for mixed in (False, True):
-        parts = split(ink, mixed=mixed)
-        assert parts.areas is None
-        assert parts.apart is None
-        assert not parts.rings
-        assert (parts.thin.mask == ink.mask).all()
-
-
-def test_an_area_and_the_line_that_leaves_it() -> None:
-    parts = split(find_ink(drawn(BLOB)), mixed=True)
-    thin, areas = parts.thin, parts.areas
-    assert areas is not None
-    assert areas.labels.max() == 1
-    assert not (thin.mask & (areas.labels > 0)).any()
-    rows, columns = np.nonzero(thin.mask)
-    assert columns.min() >= 44
-    assert abs(rows.mean() - 35.5) < 0.6
-    inner = areas.cover[15:58, 8:40]
-    assert abs(inner.sum() + areas.cover[15:58, 40:49].sum() - np.pi * 17.5**2) < 12
 
 
 def test_a_partly_covered_edge_is_measured_although_ink_is_broad() -> None:
@@ -50,16 +26,6 @@ def test_tips_belong_to_their_area() -> None:
     assert areas is not None
     assert areas.labels.max() == 1
     assert np.nonzero(thin.mask)[1].min() > 60
-
-
-def test_a_line_reaches_into_its_area() -> None:
-    drawing = trace_ink(find_ink(drawn(BLOB)), mixed=True)
-    assert drawing.areas is not None
-    assert len(drawing.lines) == 1
-    ends = drawing.lines[0].points[[0, -1]]
-    assert drawing.areas.labels[36, int(ends[:, 0].min())] == 1
-    assert 84 < ends[:, 0].max() < 90
-    assert drawing.area_pens.tolist() == [drawing.lines[0].pen]
 
 
 def test_pens_have_the_colour_of_their_areas() -> None:

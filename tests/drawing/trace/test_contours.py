@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
+from warpsplat.drawing.trace.contours import Fill, merged
 from warpsplat.drawing.trace.curves import Pieces, straight
 from warpsplat.drawing.trace.palette import Coloring
-from warpsplat.scene.attributes import Joint
 
 
 def ring(*corners: tuple[float, float]) -> Pieces:
     ends = np.array(corners, float)
     return Pieces(straight(ends, np.roll(ends, -1, axis=0)), np.ones(len(ends), np.bool_))
-
-
-def test_parts_are_joined_by_lines() -> None:
-    made = assembled([np.array([(0.0, 0.0), (5.0, 0.0)]), np.array([(5.0, 5.0)])])
-    assert made is not None and len(made.cubics) == 3 and made.lines.all()
-    assert assembled([np.zeros((0, 2))]) is None
-    assert joints_of([made]).tolist() == [Joint.CORNER, Joint.LINE_HANDLE, Joint.LINE_HANDLE] * 3
 
 
 def test_shapes_of_one_colour_are_one_unless_something_lies_between() -> None:

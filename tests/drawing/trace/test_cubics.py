@@ -50,11 +50,6 @@ def test_it_begins_and_ends_as_they_do() -> None:
             assert way @ (handle - end) > 0
 
 
-def test_points_without_extent() -> None:
-    nothing = np.zeros((4, 2))
-    assert not handles_through(nothing, nothing).any()
-
-
 def test_many_at_once_are_as_each_alone() -> None:
     rng = np.random.default_rng(1)
     first, second = rng.normal(0, 5, (2, 30, 4, 2))

@@ -50,7 +50,3 @@ def test_what_is_coloured_in_is_paper_too() -> None:
     black = drawn(CROSS)[..., 0] < 0.5
     assert ink.mask[black].mean() > 0.9
     assert ink.mask[~black].mean() < 0.05
-
-
-def test_empty_paper_has_no_ink() -> None:
-    assert not find_ink(np.full((40, 50, 3), 0.8, np.float32)).mask.any()

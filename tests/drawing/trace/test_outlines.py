@@ -10,7 +10,7 @@ from warpsplat.drawing.trace.grids import NO_REGION, components
 from warpsplat.drawing.trace.order import find_tree
 from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.partition import find_partition
-from warpsplat.drawing.trace.planar import STEPS, Loops, find_loops
+from warpsplat.drawing.trace.planar import STEPS, find_loops
 from warpsplat.drawing.trace.regions import find_regions
 
 
@@ -51,23 +51,6 @@ def test_each_crack_ends_where_the_next_begins() -> None:
         assert (ends == np.roll(loops.vertices[part], -1, axis=0)).all()
     outer = loops.region[~loops.is_hole]
     assert sorted(outer.tolist()) == list(range(labels.max() + 1)), "each region has one loop around it"
-
-
-def test_loops_of_chosen_regions_are_among_all() -> None:
-    labels, _ = components(
-        np.random.default_rng(1).integers(0, 3, (20, 20)).astype(np.int32), np.zeros((20, 20, 4))
-    )
-    image, chosen = grey(labels), np.arange(labels.max() + 1) % 3 == 1
-
-    def found(loops: Loops) -> set[tuple[int, bool, bytes]]:
-        cracks = np.concatenate([loops.vertices, loops.others[:, None]], axis=1)
-        parts = np.split(cracks, loops.first[1:-1])
-        return set(
-            zip(loops.region.tolist(), loops.is_hole.tolist(), (p.tobytes() for p in parts), strict=True)
-        )
-
-    every = {loop for loop in found(find_loops(labels, image)) if loop[0] >= 0 and chosen[loop[0]]}
-    assert found(find_loops(labels, image, chosen)) == every
 
 
 @pytest.mark.parametrize("dark", [True, False])

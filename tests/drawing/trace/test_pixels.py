@@ -76,12 +76,6 @@ def _area(points: list[tuple[int, int]]) -> float:
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
-def test_cells_that_touch_by_a_corner_are_apart() -> None:
-    found = outlines(np.eye(3, dtype=np.bool_))
-    assert len(found) == 3
-    assert all(len(points) == 4 for points in found)
-
-
 def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pixels, "MOST_CELLS", 100)
     with pytest.raises(ImageError, match="16x16 cells, more than pixel art may have"):

@@ -5,27 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.trace.drawings import LOGO, draw, ground, levels, photograph, star
+from tests.drawing.trace.drawings import draw, ground, levels, star
 from warpsplat.drawing.trace.fewer import fewer_regions
 from warpsplat.drawing.trace.regions import Regions, find_regions
-from warpsplat.scene import Paint
 
 
 def colors_of(found: Regions) -> set[tuple[int, ...]]:
     """Colours of the regions, with their opacity."""
     return {tuple(np.round(found.colorings[p].color).astype(int).tolist()) for p in found.paint.tolist()}
-
-
-def test_edges_make_no_regions() -> None:
-    found = find_regions(levels(draw(LOGO)))
-    assert colors_of(found) == {
-        (0, 0, 0, 0),
-        (0x24, 0x57, 0xA8, 255),
-        (0xFF, 0xD2, 0x3F, 255),
-        (0xEE, 0x42, 0x66, 255),
-        (255, 255, 255, 255),
-    }
-    assert len(found.paint) <= 6  # the disc may touch the rectangle's corner of the canvas
 
 
 def test_an_edge_pixel_belongs_to_what_has_most_of_it() -> None:
@@ -70,18 +57,6 @@ def test_thin_bars_and_their_outlines_are_two_colours() -> None:
     assert all(found.colorings[p].color[0] == 255 for p in found.paint[found.labels[bright]])
 
 
-def test_a_ramp_is_one_region() -> None:
-    body = (
-        '<defs><linearGradient id="a"><stop stop-color="#f80"/><stop offset="1" stop-color="#80f"/>'
-        '</linearGradient></defs><rect x="8" y="8" width="80" height="60" fill="url(#a)"/>'
-    )
-    found = find_regions(levels(draw(ground("#eee") + body)))
-    assert len(found.paint) == 2
-    ramp = found.colorings[found.paint[found.labels[30, 30]]].ramp
-    assert ramp is not None and ramp.paint == Paint.LINEAR and ramp.residual < 1
-    assert len(ramp.offsets) == 2
-
-
 @pytest.mark.parametrize("quality", [60, 85])
 def test_what_jpeg_leaves_is_no_region(quality: int) -> None:
     body = ground("#264653") + '<rect x="16" y="14" width="30" height="60" fill="#e9c46a"/>'
@@ -99,11 +74,6 @@ def test_tips_that_jpeg_tints_are_no_regions(quality: int, tips: int, inner: flo
     body = ground("#ffffff") + f'<polygon points="{star(48, 48, 45, inner, tips)}" fill="#c1121f"/>'
     found = find_regions(levels(draw(body, jpeg=quality)))
     assert len(found.paint) == 2
-
-
-def test_every_pixel_has_a_region() -> None:
-    found = find_regions(levels(photograph()))
-    assert set(np.unique(found.labels).tolist()) == set(range(len(found.paint))), "without gaps"
 
 
 def test_regions_seen_least_go_first() -> None:

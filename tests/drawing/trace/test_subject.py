@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import io
-
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
 
-from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from tests.drawing.trace.drawings import LOGO, as_file, draw, ground, photograph
 from warpsplat.drawing.trace.subject import guess_subject
-from warpsplat.files.sources import image_of
 from warpsplat.scene import FloatArray
 
 LINES = ground("#fff") + (
@@ -162,12 +158,6 @@ def cut_out() -> FloatArray:
     return np.where(inside[..., None], np.clip(photograph(192) + detail, 0, 1), 1).astype(np.float32)
 
 
-def jpeg(image: FloatArray, quality: int) -> FloatArray:
-    data = io.BytesIO()
-    Image.fromarray(np.round(255 * image).astype(np.uint8)).save(data, "JPEG", quality=quality)
-    return image_of(data.getvalue())
-
-
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -193,9 +183,9 @@ PICTURES = {
     "page with noise": (grainy(page(), 4), "drawing"),
     "icon with noise": (grainy(icon(32), 4), "drawing"),
     "logo with noise": (grainy(draw(ground("#fff") + LOGO), 4), "drawing"),
-    "page as JPEG": (jpeg(page(), 75), "drawing"),
-    "icon as JPEG": (jpeg(icon(32), 75), "drawing"),
-    "small logo as JPEG": (jpeg(draw(ground("#fff") + LOGO), 75), "drawing"),
+    "page as JPEG": (as_file(page(), quality=75), "drawing"),
+    "icon as JPEG": (as_file(icon(32), quality=75), "drawing"),
+    "small logo as JPEG": (as_file(draw(ground("#fff") + LOGO), quality=75), "drawing"),
     "on a checkerboard": (on_checkerboard(), "drawing"),
     "cut out": (cut_out(), "photo"),
     "cells of many colours": (cells(20, 4, 90), "pixel"),
