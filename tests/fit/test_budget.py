@@ -48,35 +48,30 @@ def fitted(monkeypatch: pytest.MonkeyPatch, device: str, seconds: float, clock: 
     return fit(Problem(picture(), settings), Run(Backend.on(device, 1), deadline=clock.now + seconds))
 
 
-def test_the_steps_fill_the_time(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Clock()
-    made = fitted(monkeypatch, device, 120.0, clock)
-    assert 100 < made.iterations < 120
-    assert clock.now <= 1120
-    assert len(made.scene) == CURVES
-
-
-@pytest.mark.parametrize("seconds", [-5.0, 3.0, 20.0])
-def test_a_late_start_costs_steps_and_no_shapes(
-    seconds: float, device: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("seconds", "jump", "is_compiling", "least", "most"),
+    [
+        (120, 0, False, 101, 119),
+        *((seconds, 0, False, CHECK_INTERVAL, max(CHECK_INTERVAL, seconds)) for seconds in (-5, 3, 20)),
+        (120, 500, False, 31, 32 + CHECK_INTERVAL),
+        (180, 60, True, 101, 119),
+    ],
+    ids=["all", "too late", "very late", "late", "lost between", "compiling"],
+)
+def test_the_steps_fill_the_time_and_no_shapes_are_lost(
+    seconds: float,
+    jump: float,
+    is_compiling: bool,
+    least: float,
+    most: float,
+    device: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As after kernels were compiled: few steps are left, or none."""
-    made = fitted(monkeypatch, device, seconds, Clock())
-    assert CHECK_INTERVAL <= made.iterations <= max(CHECK_INTERVAL, seconds)
+    """Time that goes by between steps leaves fewer of them; after compiling they are no slower than before."""
+    clock = Clock(jump)
+    if is_compiling:
+        monkeypatch.setattr(budget, "compile_seconds", lambda: clock.jumped)
+    made = fitted(monkeypatch, device, seconds, clock)
+    assert least <= made.iterations <= most
     assert len(made.scene) == CURVES
-
-
-def test_time_that_is_lost_between_costs_steps_and_no_shapes(
-    device: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = fitted(monkeypatch, device, 120.0, Clock(500.0))
-    assert 30 < made.iterations <= 32 + CHECK_INTERVAL
-    assert len(made.scene) == CURVES
-
-
-def test_compiling_does_not_make_steps_slow(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time is gone, but the steps after it take no longer than those before."""
-    clock = Clock(60.0)
-    monkeypatch.setattr(budget, "compile_seconds", lambda: clock.jumped)
-    made = fitted(monkeypatch, device, 180.0, clock)
-    assert 100 < made.iterations < 120
+    assert jump or seconds < 100 or clock.now <= 1000 + seconds

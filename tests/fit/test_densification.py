@@ -12,14 +12,12 @@ import pytest
 import warpsplat
 from tests.fit.pictures import picture, step_for
 from tests.scenes import random_scene
-from warpsplat.fit.densification import densify, remove_surplus, replace_shapes
+from warpsplat.fit.densification import densify, remove_surplus
 from warpsplat.fit.loop import fit
-from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.schedule import mean_points_at
-from warpsplat.fit.settings import Density, Settings, make_settings
+from warpsplat.fit.settings import Density, make_settings
 from warpsplat.fit.simplify import MIN_SPLINE_POINTS
-from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, Canvas, Kind, Scene
@@ -28,28 +26,6 @@ CURVES = 12
 USUAL = {"curves": CURVES, "iterations": 100, "seed": 1, "subject": "photo", "device": "cpu"}
 LATE = 62
 """Steps after which such runs have their whole surplus."""
-
-
-def grid_step(settings: Settings, count: int, device: str) -> Step:
-    """Return a step for new shapes on a grid."""
-    scene = grid_scene(settings, picture(), count, np.random.default_rng(0))
-    return step_for(scene, picture(), device, settings)
-
-
-def test_a_step_refuses_to_run_until_it_is_rebuilt(device: str) -> None:
-    """Its launches hold the addresses of arrays that are gone."""
-    settings = make_settings(curves=12, iterations=100)
-    step = grid_step(settings, 12, device)
-    step.advance()
-    replace_shapes(step, step.state.scene(), np.arange(6), step.state.scene().take(np.arange(0)), 12)
-    for refused in (step.advance, lambda: step.configure(settings), step.render, lambda: step.time(1)):
-        with pytest.raises(RuntimeError, match="recorded before"):
-            refused()
-    step.rebuild()
-    assert step.state.step == 1
-    step.advance()
-    assert step.state.step == 2
-    assert np.isfinite(step.psnr())
 
 
 def test_points_follow_the_schedule(device: str) -> None:

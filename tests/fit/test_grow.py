@@ -63,16 +63,6 @@ def bar_and_disc() -> FloatArray:
     return image
 
 
-@pytest.mark.parametrize("mixed", [True, False])
-def test_a_bar_gets_a_stroke_and_a_disc_a_fill(mixed: bool) -> None:
-    image, settings = bar_and_disc(), make_settings(mixed=mixed)
-    scene = empty_scene(settings, image)
-    added = new_shapes(settings, scene, image, np.square(image).sum(axis=2), 2, np.random.default_rng(0))
-    x = np.array([added.points_of(i)[:, 0].mean() for i in range(2)])
-    kinds = added.kind[np.argsort(x)].tolist()
-    assert kinds == [Kind.STROKE if mixed else Kind.FILL, Kind.FILL]
-
-
 def test_a_mixed_run_has_both_kinds(device: str) -> None:
     settings = make_settings(mixed=True, curves=8, iterations=40, background="#000000")
     result = vectorize(bar_and_disc(), settings, Backend.on(device))

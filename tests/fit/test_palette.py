@@ -98,12 +98,6 @@ def test_main_colours_are_the_pictures_own() -> None:
     assert len(main_colors(own, np.ones(3, np.int64), 8)) == 3
 
 
-def test_colours_of_a_palette_are_not_trained() -> None:
-    assert make_settings(colors=4, rates={"colors": 0.1, "points": 2.0}).rates["colors"] == 0
-    assert make_settings(colors=4, rates={"points": 2.0}).rates["points"] == 2
-    assert make_settings(opaque=True).rates["colors"] > 0
-
-
 def test_palettes_as_texts(tmp_path: Path) -> None:
     assert parse_palette("#F00, lime\n#f00, Red") == ("#ff0000", "#00ff00")
     for bad in ("rad", "#12", "", "#ggg"):

@@ -40,9 +40,11 @@ def flag(bands: int) -> np.ndarray:
     return (stripes[:, None, None] * np.ones((1, 300, 3))).astype(np.float32)
 
 
-def test_few_flat_regions_need_few_curves() -> None:
+def test_few_flat_regions_and_tiny_images_need_few_curves() -> None:
     assert simple_curves(flag(2)) == place.MIN_SIMPLE_CURVES
     assert simple_curves(flag(10)) == 10 * place.SHAPES_PER_REGION
+    assert simple_curves(blobs(16, 16)) == 256 // place.PIXELS_PER_CURVE
+    assert simple_curves(blobs(2, 2)) == 1
 
 
 def test_photographs_and_soft_pictures_get_the_default() -> None:
@@ -52,8 +54,3 @@ def test_photographs_and_soft_pictures_get_the_default() -> None:
     moon[:120, :100] = soft[:120, ::3]
     for target in (soft, noise, moon, blobs(400, 300)):
         assert simple_curves(target) >= make_settings().curves
-
-
-def test_tiny_images_have_room_for_few_curves() -> None:
-    assert simple_curves(blobs(16, 16)) == 256 // place.PIXELS_PER_CURVE
-    assert simple_curves(blobs(2, 2)) == 1

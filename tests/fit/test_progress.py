@@ -10,8 +10,6 @@ import pytest
 
 from warpsplat.fit.problem import Run
 from warpsplat.fit.progress import Progress, TimeLeft
-from warpsplat.fit.schedule import phases, work_done
-from warpsplat.fit.settings import make_settings
 from warpsplat.rendering.backend import Backend
 
 NOW = Progress(1, 10, 20.0, 0.0, 0.5, fine=True)
@@ -45,17 +43,6 @@ def test_a_run_is_over_at_its_deadline() -> None:
     run = replace(late, deadline=time.monotonic() + 100)
     assert not run.over() and time.monotonic() + 49 < run.within(0.5).deadline < time.monotonic() + 51
     assert replace(late, deadline=math.inf).within(0.5).deadline == math.inf
-
-
-def test_work_goes_on_with_the_steps_and_fine_ones_count_for_more() -> None:
-    settings = make_settings(curves=64)
-    plan = phases(settings, 768, 512)
-    steps, change = settings.iterations, round(settings.coarse * settings.iterations)
-    shares = [work_done(settings, plan, step) for step in (0, change // 2, change, steps)]
-    assert shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1
-    assert shares[2] < change / steps
-    assert work_done(settings, plan, change, begin=change) == 0
-    assert work_done(settings, plan, steps, begin=change) == 1
 
 
 def test_time_left_follows_the_pace_since_the_first_report() -> None:

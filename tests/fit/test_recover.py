@@ -124,15 +124,6 @@ def test_twins_are_reset_together() -> None:
     np.testing.assert_array_equal(made.points_of(2), made.points_of(3))
 
 
-def test_frozen_values_are_checked_in_the_end() -> None:
-    step = step_of(scene_of("fills"))
-    step.state.parameters.hold("opacities", np.ones(6, np.bool_))
-    poison(step, "opacities", "value")
-    step.advance()
-    recover(step, replaces=False, last=True)
-    assert all_finite(step) and step.state.renewed >= 1
-
-
 @pytest.mark.parametrize("at", [10, 60, 90, 100])
 def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """While the number of shapes grows, while coordinates are rounded, and at the last step."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,12 +14,8 @@ from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import (
-    STAGES,
     choose_grid,
     freeze_opacities,
-    freeze_stage,
-    opacities_at,
-    stage_at,
 )
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
@@ -47,46 +42,6 @@ def step_of(scene: Scene, device: str, image: FloatArray | None = None) -> Step:
     step = step_for(scene, picture() if image is None else image, device, SETTINGS)
     advanced(step)
     return step
-
-
-@pytest.mark.parametrize("quality", ["draft", "balanced"])
-@pytest.mark.parametrize("iterations", [4, 7, 60, 1000, 2000])
-def test_when_stages_and_opacities_are_due(iterations: int, quality: Literal["draft", "balanced"]) -> None:
-    settings = make_settings(quality, iterations=iterations)
-    found = {step: stage_at(settings, step) for step in range(iterations)}
-    due = {step: stage for step, stage in found.items() if stage is not None}
-    assert list(due.values()) == list(range(1, STAGES + 1))
-    gaps = np.diff([*due, iterations])
-    assert (gaps == gaps[0]).all(), "as many steps after each"
-    at = opacities_at(settings)
-    assert 0 < at <= min(due)
-    if iterations >= 60:
-        assert at > max(settings.density.stop, settings.coarse) * iterations
-
-
-@pytest.mark.parametrize("stage", range(1, STAGES + 1))
-def test_a_stage_rounds_and_freezes_its_share(device: str, stage: int) -> None:
-    """The points 0, 3, 6 ... of each shape, then those after them, then those before; all widths at once."""
-    step = step_of(mixed_scene(64, 48), device)
-    state = step.state
-    state.grid = 2.0
-    before = state.scene()
-    low = rounded(before, 2.0)
-    freeze_stage(step, stage)
-    after = state.scene()
-    number = np.concatenate([np.arange(n) for n in before.point_counts()])
-    frozen = number % 3 < stage
-    np.testing.assert_array_equal(after.points, np.where(frozen[:, None], low.points, before.points))
-    np.testing.assert_array_equal(after.widths, low.widths)
-    assert (after.widths != before.widths).any()
-    for name in ("opacities", "colors"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
-    moved = advanced(step)
-    np.testing.assert_array_equal(moved.points[frozen], after.points[frozen])
-    assert frozen.all() or (moved.points[~frozen] != after.points[~frozen]).any(axis=1).mean() > 0.8
-    np.testing.assert_array_equal(moved.widths, after.widths)
-    assert (moved.opacities != after.opacities).any()
-    assert (moved.colors != after.colors).any()
 
 
 def opacity_step(device: str) -> Step:

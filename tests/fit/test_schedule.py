@@ -3,7 +3,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from warpsplat.fit.schedule import (
@@ -11,10 +10,7 @@ from warpsplat.fit.schedule import (
     phases,
     shapes_at,
 )
-from warpsplat.fit.settings import QUALITIES, Density, Quality, Settings, make_settings
-
-DENSITY = Density(start=1 / 3, grown=0.5, surplus=1.5, thin=0.6, stop=0.8, mean_points=8.0)
-SETTINGS = make_settings(curves=90, iterations=1000, density=DENSITY, spline_points=12)
+from warpsplat.fit.settings import QUALITIES, Quality, Settings, make_settings
 
 
 def test_phases() -> None:
@@ -46,22 +42,6 @@ def densification_steps(settings: Settings) -> list[int]:
     """Return the steps after which there is densification; 0 for the start."""
     density = settings.density
     return list(range(0, math.ceil(density.stop * settings.iterations), density.interval))
-
-
-def test_the_number_of_shapes_grows_to_a_surplus_and_falls() -> None:
-    """It grows until ``grown``, stays until ``thin``, falls until ``stop`` by equal shares."""
-    counts = {step: shapes_at(SETTINGS, step) for step in densification_steps(SETTINGS)}
-    assert counts[0] == 30
-    growing = [counts[s] for s in counts if s <= 500]
-    assert growing == sorted(set(growing)), "more at every step"
-    assert {counts[s] for s in counts if 500 <= s <= 600} == {135}
-    falling = [counts[s] for s in counts if s >= 600]
-    assert falling == sorted(set(falling), reverse=True), "fewer at every step"
-    assert falling[-1] == 90
-    many = replace(SETTINGS, curves=9000)
-    exact = np.array([shapes_at(many, step) for step in counts if step >= 600])
-    shares = exact[1:] / exact[:-1]
-    np.testing.assert_allclose(shares, shares[0], rtol=1e-3)
 
 
 @pytest.mark.parametrize("quality", QUALITIES)

@@ -99,18 +99,8 @@ def test_a_step_is_the_same_with_the_lanes_of_a_gpu(
         step.advance()
         gradients = step.renderer.parameters.gradients()
         visible = step.renderer.visible()
-        step = step_for(scene, target, device, settings, weights=weights)
-        step.advance()
-        gradients = step.renderer.parameters.gradients()
-        visible = step.renderer.visible()
         near = step.objective.quadratic()
-        read = (
-            near.removal_costs(),
-            near.residual(),
-            step.objective.by_pixel(),
-            visible.share,
-            visible.color,
-        )
+        read = near.removal_costs(), near.residual(), step.objective.by_pixel(), visible.share, visible.color
         found.append([np.array(step.objective.value()), np.array(step.psnr()), *gradients.values(), *read])
     for one, *others in zip(*found, strict=True):
         for many in others:
