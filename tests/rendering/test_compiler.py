@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import pytest
@@ -16,26 +16,6 @@ from warpsplat.rendering.compiler import compile_later, compiler_finished, wait_
 def compile_now(work: Callable[[], object]) -> None:
     """Have work done by the compiler, and wait for it."""
     wait_for(partial(compile_later, lambda: work() and None))
-
-
-@pytest.fixture
-def cores(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A compiler of its own for a test, with so many cores."""
-    monkeypatch.setattr(compiler, "available_cores", lambda: request.param)
-    compiler._compiler.cache_clear()
-    yield request.param
-    compiler._compiler.cache_clear()
-
-
-@pytest.mark.parametrize("cores", [2], indirect=True)
-def test_modules_are_compiled_at_the_same_time(cores: int) -> None:
-    both = threading.Barrier(cores, timeout=20)
-
-    def work() -> None:
-        both.wait()
-
-    for future in [compile_later(work) for _ in range(cores)]:
-        future.result()
 
 
 def test_what_the_compiler_raises_is_raised_where_it_is_waited_for() -> None:
@@ -68,22 +48,24 @@ def test_an_interrupted_wait_leaves_the_compiler_at_work(monkeypatch: pytest.Mon
     assert done.is_set()
 
 
-@pytest.mark.parametrize("cores", [1], indirect=True)
-def test_at_the_end_only_what_has_begun_is_finished(cores: int) -> None:
+def test_at_the_end_only_what_has_begun_is_finished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a compiler of its own, which has one core."""
     begun, go_on = threading.Event(), threading.Event()
 
     def work() -> None:
         begun.set()
         go_on.wait()
 
-    first = compile_later(work)
-    second = compile_later(lambda: None)
+    monkeypatch.setattr(compiler, "available_cores", lambda: 1)
+    compiler._compiler.cache_clear()
+    first, second = compile_later(work), compile_later(lambda: None)
     begun.wait()
     assert not compiler_finished(0.01)
     assert second.cancelled()
     go_on.set()
     assert compiler_finished()
     assert first.result() is None
+    compiler._compiler.cache_clear()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks")

@@ -85,10 +85,10 @@ def test_hidden_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["doctor"]["status"] == "note"
 
 
+ERROR = "Warp CUDA error"
 NO_DRIVER: dict[str, Any] = {
     "driver_version": None,
-    "min_driver_version": (13, 0),
-    "toolkit_version": (13, 0),
+    **dict.fromkeys(("min_driver_version", "toolkit_version"), (13, 0)),
 }
 
 
@@ -97,21 +97,9 @@ NO_DRIVER: dict[str, Any] = {
     [
         (False, "", None, "this build of Warp has no CUDA", False),
         (True, "", "0", "there is no NVIDIA driver", False),
-        (
-            True,
-            "Warp CUDA error 803: unsupported combination (in function init)",
-            None,
-            "unsupported combi",
-            True,
-        ),
-        (
-            True,
-            "Warp CUDA error 100: no CUDA-capable device is detected",
-            "",
-            "is '', which hides all GPUs",
-            False,
-        ),
-        (True, "Warp CUDA error 100: no CUDA-capable device is detected", None, "finds no GPU", False),
+        (True, f"{ERROR} 803: unsupported combination (in function init)", None, "unsupported combi", True),
+        (True, f"{ERROR} 100: no CUDA-capable device is detected", "", "is '', which hides all GPUs", False),
+        (True, f"{ERROR} 100: no CUDA-capable device is detected", None, "finds no GPU", False),
     ],
 )
 def test_no_gpu(
@@ -144,10 +132,6 @@ def test_a_driver_that_warp_refuses_to_start(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("warp.init", lambda: os.write(2, f"Warp CUDA error: {words}\n".encode()))
     start_warp()
     assert no_gpu().cause == words and no_gpu().there
-
-
-def test_what_is_no_device() -> None:
-    start_warp()
     with pytest.raises(UsageError, match="unknown device 'tpu'; here there are: cpu"):
         choose_device("tpu")
 

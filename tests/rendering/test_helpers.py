@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -46,51 +44,6 @@ def test_what_a_piece_raises_reaches_the_caller() -> None:
     failing.launches.append(Launch("", "fail", (fail, fail)))
     with pytest.raises(ValueError, match="no good"):
         failing.run()
-
-
-class LateHelpers:
-    """A crew on a busy machine: none of it begins before the caller is done."""
-
-    count = 1
-
-    def __init__(self) -> None:
-        self.asked: list[helpers.LaunchRequest] = []
-
-    def ask(self, work: Callable[[], None]) -> helpers.LaunchRequest:
-        self.asked.append(helpers.LaunchRequest(work))
-        return self.asked[-1]
-
-
-def test_helpers_that_come_too_late_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    crew = LateHelpers()
-    monkeypatch.setattr(helpers, "helpers", lambda threads: crew)
-    done: list[int] = []
-    late = Program(wp.get_device("cpu"), 2)
-    late.launches.append(Launch("", "note", tuple(functools.partial(done.append, i) for i in range(5))))
-    late.run()
-    assert done == [0, 1, 2, 3, 4]
-    late.run()
-    for request in crew.asked:
-        request.serve()
-    assert done == 2 * [0, 1, 2, 3, 4], "the arrays may be gone by now"
-
-
-def test_what_has_begun_is_waited_for() -> None:
-    begun, may_end, done = threading.Event(), threading.Event(), []
-
-    def work() -> None:
-        begun.set()
-        may_end.wait(10)
-        done.append(1)
-
-    request = helpers.LaunchRequest(work)
-    helper = threading.Thread(target=request.serve)
-    helper.start()
-    begun.wait(10)
-    threading.Timer(0.01, may_end.set).start()
-    request.settle()
-    assert done
-    helper.join()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.helpers import SPLAT, adjoint, compare, renderer_for
-from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene, random_scene
+from tests.scenes import MIXED_CUBICS, Outline, mixed_scene, ragged_scene
 from warpsplat.rendering.models import EXACT, Model
 from warpsplat.scene import Basis, Kind, Scene
 
@@ -76,11 +76,3 @@ def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> 
         )
         for name in ("colors", "opacities", "widths"):
             np.testing.assert_allclose(together[name][i], alone[name][0], rtol=1e-4, atol=1e-4)
-
-
-def test_fills_have_no_gradient_of_a_width(device: str) -> None:
-    scene = mixed_scene().append(random_scene(Kind.FILL, 2, seed=9))
-    renderer = renderer_for(scene, device)
-    gradient = adjoint(renderer)["widths"]
-    assert not gradient[scene.kind == Kind.FILL].any()
-    assert gradient[scene.kind == Kind.STROKE].all()

@@ -67,32 +67,3 @@ def test_fewer_points_keep_their_moments(device: str) -> None:
         for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
             np.testing.assert_array_equal(moment.numpy(), old[rows])
     assert parameters.revision == 1
-
-
-def test_held_rows_until_the_next_surgery(device: str) -> None:
-    scene = mixed_scene()
-    parameters = Parameters(scene, Backend.on(device))
-    assert not any(group.held.numpy().any() for group in parameters.groups.values())
-    rows = np.arange(len(scene.points)) % 3 == 1
-    parameters.hold("points", rows)
-    np.testing.assert_array_equal(parameters.groups["points"].held.numpy(), rows)
-    assert not parameters.groups["colors"].held.numpy().any()
-    parameters.rearrange(np.arange(3), scene.take(np.arange(1)))
-    assert not parameters.groups["points"].held.numpy().any()
-
-
-def test_assigned_values_leave_all_else_as_it_is(device: str) -> None:
-    scene = mixed_scene()
-    parameters = Parameters(scene, Backend.on(device))
-    group = parameters.groups["points"]
-    group.moment1.fill_(2.0)
-    address = group.value.ptr
-    other = replace(scene, points=scene.points + 1, colors=scene.colors * 0.5)
-    parameters.assign(other)
-    for attribute in ATTRIBUTES:
-        np.testing.assert_array_equal(
-            getattr(parameters.scene(), attribute.name), getattr(other, attribute.name)
-        )
-    assert parameters.groups["points"].value.ptr == address
-    assert (parameters.groups["points"].moment1.numpy() == 2).all()
-    assert parameters.revision == 0
