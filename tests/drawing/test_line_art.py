@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,12 @@ from tests.drawing.drawings import vectorized
 from tests.drawing.trace.drawings import as_file, draw_exactly, ground
 from tests.drawing.trace.line_art import CROSS, PEN, TEE, drawn, grown, shown
 from tests.runs import scored
+from warpsplat.drawing.junctions import with_junctions
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.run.result import Result
-from warpsplat.scene import Kind
+from warpsplat.scene import Canvas, Kind, Scene
+from warpsplat.svg.data import straight_cubics
 
 
 def lines_of(image: np.ndarray, device: str, **options: object) -> Result:
@@ -158,3 +161,137 @@ def test_what_is_broad_at_the_end_of_a_line_is_covered(device: str) -> None:
     ink = 1 - image[..., 0]
     assert grown(painted > 0.5)[ink > 0.5].mean() > 0.99
     assert np.clip(painted - ink, 0, None).sum() < 0.03 * painted.sum()
+
+
+def strokes(*cubics: list[tuple[float, float]], width: float = 4) -> Scene:
+    """Strokes of one cubic each; of two points, a line."""
+    points = [np.array(c) if len(c) == 4 else np.linspace(c[0], c[-1], 4) for c in cubics]
+    scene = Scene.uniform(Kind.STROKE, Canvas(96, 72, None), np.array(points, np.float32))
+    return replace(scene, widths=np.full(len(cubics), width, np.float32))
+
+
+BAR = [(10, 20), (86, 20)]
+
+
+@pytest.mark.parametrize(
+    ("end", "met"), [((48, 21.4), (48, 20)), ((48, 18.5), (48, 20)), ((37, 21.5), (36.2105, 20))]
+)
+def test_an_end_in_the_ink_of_another_is_put_on_its_centre_line(
+    end: tuple[float, float], met: tuple[float, float]
+) -> None:
+    scene = strokes(BAR, [end, (48 if end[0] == 48 else 60, 65.2)])
+    made = with_junctions(scene)
+    stem = made.points_of(1)
+    assert stem[0] == pytest.approx(met, abs=1e-3)
+    assert straight_cubics(made, made.points.astype(np.float64))[[0, 4]].all(), "lines stay lines"
+    assert (made.points_of(0) == scene.points_of(0)).all() and (stem[3] == scene.points_of(1)[3]).all()
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        [(48, 23), (48, 60)],  # beside the ink
+        [(20, 21), (80, 21.5)],  # along it
+        [(48, 10), (48, 60)],  # across it
+        [(48, 21), (48, 21)],  # a dot
+    ],
+)
+def test_other_ends_stay(other: list[tuple[float, float]]) -> None:
+    scene = strokes(BAR, other)
+    assert (with_junctions(scene).points == scene.points).all()
+
+
+SLANTED = '<path d="M12 12L84 24"/><path d="M40 16.667L56 64"/>'
+
+
+@pytest.mark.parametrize("paths", [TEE, SLANTED, SLANTED.replace("<path", '<path stroke-width="5"', 1)])
+@pytest.mark.parametrize("is_grey", [True, False])
+def test_a_line_that_ends_at_another_ends_on_its_centre_line(paths: str, is_grey: bool, device: str) -> None:
+    image = drawn(paths)
+    scene = vectorized(image if is_grey else np.round(image), device, "line").scene
+    bar, stem = sorted(map(scene.points_of, range(2)), key=lambda points: -float(np.ptp(points[:, 0])))
+    low = stem[stem[:, 1].argmin()]
+    first, last = bar[bar[:, 0].argmin()], bar[bar[:, 0].argmax()]
+    way = (last - first) / np.hypot(*(last - first))
+    off = low - first
+    assert abs(off[0] * way[1] - off[1] * way[0]) < 0.15
+
+
+LINE, CURVE = '<path d="M8 36H88"/>', '<path d="M8 50C30 50 30 20 48 20S66 50 88 50"/>'
+RING = '<circle cx="48" cy="36" r="22"/>'
+
+
+def scene_of(paths: str, device: str, *, is_grey: bool = True) -> tuple[Scene, float]:
+    image = drawn(paths)
+    result = vectorized(image if is_grey else np.round(image), device, "line")
+    return result.scene, scored(result).psnr
+
+
+@pytest.mark.parametrize("is_grey", [True, False])
+@pytest.mark.parametrize(
+    ("paths", "widths"),
+    [
+        (f'{LINE}<path d="M40 36H88" stroke-width="7"/>', [3, 7]),
+        ('<path d="M8 36H88" stroke-width="2"/><path d="M32 36H64" stroke-width="6"/>', [2, 2, 6]),
+        (f'{CURVE}<path d="M48 20C66 20 66 50 88 50" stroke-width="6"/>', [3, 6]),
+        (f'{RING}<path d="M48 14A22 22 0 0 1 48 58" stroke-width="6"/>', [3, 6]),
+    ],
+)
+def test_a_line_of_two_pens_is_a_stroke_of_each(
+    paths: str, widths: list[float], is_grey: bool, device: str
+) -> None:
+    scene, psnr = scene_of(f'{paths}<path d="M8 5H88M8 67H88"/>', device, is_grey=is_grey)
+    assert sorted(scene.widths) == pytest.approx(sorted([*widths, 3, 3]), abs=0.3 if is_grey else 0.6)
+    assert psnr > 21
+    ends = scene.points[np.concatenate([scene.first[:-1], scene.first[1:] - 1])]
+    away = np.linalg.norm(ends[:, None] - ends[None], axis=2) + 99 * np.eye(len(ends))
+    assert (away.min(axis=1) < 0.1).sum() >= 2, "one begins where the other ends"
+
+
+@pytest.mark.parametrize("is_grey", [True, False])
+@pytest.mark.parametrize(
+    "paths",
+    [
+        f'{LINE}<path d="M44 36H88" stroke-width="4"/>',
+        f'{CURVE}<path d="M48 20C66 20 66 50 88 50" stroke-width="4"/>',
+        RING,
+    ],
+)
+def test_a_pixel_is_no_other_pen(paths: str, is_grey: bool, device: str) -> None:
+    assert len(scene_of(paths, device, is_grey=is_grey)[0]) == 1
+
+
+HOOK = '<path d="M14 58V30a16 16 0 0 1 32 0v14" stroke-width="7"/>'
+RED_RING = '<circle cx="70" cy="24" r="12" stroke-width="5" stroke="#d62828"/>'
+BLOCK = '<path d="M60 46h24v16h-24z" fill="#1d3557" stroke="none"/>'
+WEDGE = '<path d="M10 12L80 8L80 20z" fill="#000" stroke="none"/>'
+BLUNT = '<path d="M14 36H84" stroke-width="12" stroke-linecap="butt"/>'
+
+
+def strokes_of(paths: str, device: str) -> Result:
+    return vectorized(drawn(paths), device, strokes=True)
+
+
+def test_lines_become_strokes_and_areas_stay_fills(device: str) -> None:
+    result = strokes_of(HOOK + RED_RING + BLOCK, device)
+    scene = result.scene
+    is_stroke = scene.kind == Kind.STROKE
+    assert is_stroke.sum() == 2
+    np.testing.assert_allclose(np.sort(scene.widths[is_stroke]), [5, 7], atol=0.15)
+    assert result.svg.count('stroke-linecap="round"') == 1
+    assert result.svg.count("<rect") == 2  # the ground and the block
+    assert scored(result).psnr > 35
+
+
+@pytest.mark.parametrize("paths", [WEDGE, BLUNT, BLOCK])
+def test_what_no_round_pen_draws_stays_a_fill(paths: str, device: str) -> None:
+    assert (strokes_of(paths, device).scene.kind == Kind.FILL).all()
+
+
+def test_one_path_may_be_partly_strokes(device: str) -> None:
+    """The rest keeps its colour and its place."""
+    result = strokes_of('<path d="M12 14H84"/>' + BLOCK.replace("#1d3557", "#000"), device)
+    scene = result.scene
+    assert scene.kind.tolist() == [Kind.FILL, Kind.STROKE]
+    np.testing.assert_array_equal(scene.colors[0], scene.colors[1])
+    assert set(scene.points_of(1)[:, 1].tolist()) == {14.0}

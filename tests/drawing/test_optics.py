@@ -1,9 +1,11 @@
-"""How a picture was made is found and undone."""
+"""How a picture was made, enlarged and coloured is found and undone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
@@ -13,6 +15,9 @@ from tests.drawing.trace.drawings import decibels, draw
 from warpsplat.drawing.constraints import DRAFT_GRID
 from warpsplat.drawing.edges import LINEAR, MIDDLES, find_edges
 from warpsplat.drawing.optics import NONE, SCALE, Seen
+from warpsplat.drawing.picture import Picture
+from warpsplat.drawing.reduced import before_enlarging
+from warpsplat.drawing.seen_colors import MOST_COLORS, with_seen_colors
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.drawing.without_optics import without_optics
 from warpsplat.fit.export import finished, shown_image
@@ -117,14 +122,6 @@ def test_means_and_steps_of_pixels_tell_nothing() -> None:
     assert Seen.of(image).find(pixels(small(BOX, SCALE))).kernel == NONE
 
 
-def test_colours_stay_below_opacity() -> None:
-    planes = [pixels(small(BOX, SCALE)) * 0.5, np.full((SCALE * SIDE, SCALE * SIDE, 1), 0.5, np.float32)]
-    fine = np.concatenate(planes, axis=2)
-    half = [pixels(MADE["blurred"]()) * 0.5, np.full((SIDE, SIDE, 1), 0.5, np.float32)]
-    undone = Seen.of(np.concatenate(half, axis=2)).find(fine).undone
-    assert (undone[..., :3] <= undone[..., 3:]).all()
-
-
 @pytest.mark.parametrize(("how", "is_late"), [(None, False), ("blurred", True)])
 def test_an_image_that_is_as_it_was_drawn_stays_and_so_do_all_without_time(
     how: str | None, is_late: bool
@@ -176,3 +173,118 @@ def test_small_images_have_no_edges(shape: tuple[int, int], planes: int) -> None
     found = find_edges(image)
     np.testing.assert_array_equal(found.plain, image)
     assert not found.has_rings and not found.is_linear
+
+
+def floats(image: Image.Image) -> FloatArray:
+    return np.asarray(image, np.float32)
+
+
+@pytest.mark.parametrize("size", [(120, 120), (144, 144), (201, 200), (230, 230), (301, 300)])
+@pytest.mark.parametrize("by", ["Pillow", "OpenCV"])
+def test_any_factor_is_found(size: tuple[int, int], by: str) -> None:
+    was = small(BOX)
+    large = was.resize(size, Image.Resampling.BILINEAR)
+    if by == "OpenCV":
+        large = Image.fromarray(cv2.resize(np.asarray(was), size, interpolation=cv2.INTER_LINEAR))
+    found = before_enlarging(floats(large))
+    assert found is not None and found.shape == (SIDE, SIDE, 3)
+    assert np.abs(found - floats(was)).mean() < 0.5
+
+
+@pytest.mark.parametrize(
+    "how", [Image.Resampling.BICUBIC, Image.Resampling.LANCZOS, Image.Resampling.NEAREST]
+)
+def test_other_ways_to_enlarge_leave_an_image_as_it_is(how: Image.Resampling) -> None:
+    assert before_enlarging(floats(small(BOX).resize((150, 150), how))) is None
+
+
+def test_what_was_not_enlarged_or_is_smooth_stays() -> None:
+    for image in (small(BOX), enlarged(2), small(BOX).filter(ImageFilter.GaussianBlur(2.5))):
+        assert before_enlarging(floats(image)) is None
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (2, 2), (3, 50)])
+def test_small_and_flat_images_stay(shape: tuple[int, int]) -> None:
+    image = np.full((*shape, 3), 90, np.float32)
+    found = before_enlarging(image)
+    assert found is None or (found == 90).all()
+
+
+def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
+    picture = pixels(small(BOX).resize((151, 150), Image.Resampling.BILINEAR))
+    assert Picture.of(picture).pixels.shape[0] < 120
+    made = warpsplat.vectorize(picture, subject="drawing")
+    assert (made.scene.canvas.width, made.scene.canvas.height) == (151, 150)
+    shown = (
+        np.asarray(on_white(render_svg(made.svg, zoom=4).resize((4 * SIDE, 4 * SIDE), BOX)), np.float32) / 255
+    )
+    assert decibels(shown, pixels(enlarged(4))) > 38
+    assert len(made.svg) < 800
+    assert made.optics and made.optics.psnr > made.score.psnr  # type: ignore[union-attr]
+
+
+def test_edges_along_the_axes_are_no_sign_of_enlargement() -> None:
+    """A mixed pixel between flat ones lies alone between two of nearly any smaller image."""
+    image = np.full((90, 120, 3), 250, np.float32)
+    image[20:70, 30:80] = (40, 90, 160)
+    image[20:70, 29], image[20:70, 80], image[19, 30:80], image[70, 30:80] = 180, 100, 230, 130
+    assert before_enlarging(image) is None
+
+
+INK = (61, 31, 54)
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="{0}" height="{0}" viewBox="0 0 96 96">'
+    '<rect width="96" height="96" fill="#fff"/><circle cx="30" cy="34" r="22" fill="#a23b72"/>'
+    '<path d="M58 12l2-.5 20 76-2 .5zM12 70l60-8 .3 2-60 8z" fill="#3d1f36"/></svg>'
+)
+
+
+def sharpened() -> Image.Image:
+    big = Image.fromarray(np.asarray(on_white(render_svg(SVG.format(768)))).astype(np.uint8))
+    return big.resize((96, 96), BOX).filter(ImageFilter.UnsharpMask(1, 60, 0))
+
+
+def scene() -> Scene:
+    return warpsplat.load_svg(SVG.format(96))
+
+
+@pytest.mark.parametrize("is_wrong", [True, False])
+def test_the_ink_of_thin_lines_is_what_it_was(is_wrong: bool) -> None:
+    seen, true = Seen.of(pixels(sharpened())), scene()
+    kernel = seen.find(*(show(each) for each in seen.scenes(true))).kernel
+    is_ink = (np.abs(255 * true.colors - INK) < 1).all(axis=1)
+    wrong = np.where(is_ink[:, None] & is_wrong, np.float32([0.15, 0, 0.12]), true.colors)
+    found = with_seen_colors(replace(true, colors=wrong), seen, kernel, show)
+    np.testing.assert_allclose(255 * found.colors, 255 * true.colors, atol=4)
+    np.testing.assert_array_equal(found.points, true.points)
+
+
+def test_gradients_stay_and_count() -> None:
+    """What is not flat shows as it is; colours beside it are solved for."""
+    shaded = (
+        SVG.format(96)
+        .replace(
+            "<circle",
+            '<linearGradient id="g"><stop stop-color="#fd0"/><stop offset="1" stop-color="#06c"/>'
+            "</linearGradient><circle",
+            1,
+        )
+        .replace('fill="#a23b72"', 'fill="url(#g)"')
+    )
+    true = warpsplat.load_svg(shaded)
+    image = pixels(Image.fromarray(np.asarray(on_white(render_svg(shaded))).astype(np.uint8)))
+    seen = Seen.of(image)
+    kernel = seen.find(*(show(each) for each in seen.scenes(true))).kernel
+    found = with_seen_colors(true, seen, kernel, show)
+    np.testing.assert_array_equal(found.stop_colors, true.stop_colors)
+    np.testing.assert_allclose(255 * found.colors, 255 * true.colors, atol=4)
+
+
+def test_many_colours_stay() -> None:
+    bars = "".join(
+        f'<path d="M{5 * i} 0h4v96h-4z" fill="rgb({15 * i},0,90)"/>' for i in range(MOST_COLORS + 1)
+    )
+    drawn = warpsplat.load_svg(f'<svg xmlns="http://www.w3.org/2000/svg" width="96" height="96">{bars}</svg>')
+    seen = Seen.of(draw(bars))
+    fine = np.zeros((SCALE * 96, SCALE * 96, 4), np.float32)
+    assert with_seen_colors(drawn, seen, seen.find(fine).kernel, lambda each: fine) is drawn

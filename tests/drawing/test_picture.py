@@ -1,4 +1,4 @@
-"""Changes that should not matter for a drawing: margins, noise of a level or two."""
+"""What should not matter for a drawing: margins, noise of a level or two, colours of half the resolution."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import numpy.typing as npt
 import pytest
 
 import warpsplat
-from tests.drawing.trace.drawings import LOGO, draw
+from tests.drawing.drawings import vectorized
+from tests.drawing.trace.drawings import LOGO, as_file, decibels, draw, draw_exactly, ground
+from warpsplat.drawing.chroma import halved, has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.denoise import without_noise
-from warpsplat.drawing.picture import MARGIN, Picture
+from warpsplat.drawing.picture import Picture
 from warpsplat.metrics import psnr
+from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_svg
 
@@ -72,12 +75,6 @@ def test_a_pale_line_to_the_border_is_not_cut_off(tint: int) -> None:
     assert np.array_equal(Picture.of(image).pixels, image)
 
 
-def test_a_transparent_ground_is_a_ground() -> None:
-    image = np.zeros((64, 80, 4), np.float32)
-    image[20:30, 40:60] = 1
-    assert Picture.of(image).pixels.shape == (10 + 2 * MARGIN, 20 + 2 * MARGIN, 4)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
@@ -106,3 +103,58 @@ def test_an_image_without_noise_and_a_gradient_stay_as_they_are() -> None:
         clean, noise = without_noise(image)
         assert clean is image
         assert noise == known
+
+
+SHAPES = (
+    ground("#ffd24a", 96, 96)
+    + '<path d="M48.3 8.4C71 14 82 33 86.2 70.7L60.6 62.3Q48 91 30.7 88.2L9.6 30.4Z" fill="#c01850"/>'
+)
+
+LINES = ground("#fff", 96, 96) + "".join(
+    f'<path d="M{8 + 16 * i} 6l1.4-.2 6 80-1.4.2z" fill="{color}"/>'
+    for i, color in enumerate(["#d01020", "#1030c0", "#108040", "#d01020", "#1030c0"])
+)
+"""Thin lines in strong colours."""
+
+
+def as_jpeg(image: FloatArray, subsampling: int) -> FloatArray:
+    return as_file(image, quality=75, subsampling=subsampling)
+
+
+@pytest.fixture(scope="module")
+def image() -> FloatArray:
+    return draw_exactly(SHAPES, 96, 96)
+
+
+@pytest.fixture(scope="module")
+def lines() -> FloatArray:
+    return draw_exactly(LINES, 96, 96)
+
+
+def test_colours_are_blurred_by_subsampling_only(image: FloatArray) -> None:
+    grey, clear = np.repeat(image[..., :1], 3, axis=2), image[..., :1] * 0 + np.float32(0.5)
+    assert has_blurred_colors(as_jpeg(image, 2))
+    assert not has_blurred_colors(image)
+    assert not has_blurred_colors(as_jpeg(image, 0))
+    assert not has_blurred_colors(as_jpeg(grey, 2))
+    assert not has_blurred_colors(np.concatenate([as_jpeg(image, 2), clear], axis=2))
+
+
+@pytest.mark.parametrize("kind", ["jpeg", "webp"])
+def test_halved_is_what_files_do(lines: FloatArray, kind: str) -> None:
+    levels = np.round(255 * lines)
+    file = np.round(255 * as_file(lines, kind, quality=100))
+    assert decibels(halved(levels) / 255, file / 255) > decibels(levels / 255, file / 255) + 6
+
+
+def test_colours_become_as_sharp_as_lightness(image: FloatArray, lines: FloatArray) -> None:
+    for each in (image, lines):
+        soft = as_file(each, quality=95, subsampling=2)
+        assert decibels(with_sharp_colors(soft), each) > decibels(soft, each) + 3
+
+
+def test_thin_lines_keep_their_colours(lines: FloatArray, device: str) -> None:
+    """Colours taken as the file has them come to 28 dB."""
+    made = vectorized(as_file(lines, quality=95, subsampling=2), device)
+    large = draw_exactly(f'<g transform="scale(4)">{LINES}</g>', 384, 384)
+    assert decibels(render(made.scene, scale=4), large) > 38

@@ -1,15 +1,21 @@
-"""Lines, cubics, corners."""
+"""The planar map, its sub-pixel places, and the lines and cubics along it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from tests.drawing.trace.drawings import draw, draw_exactly, ground, levels
 from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.corners import find_corners
+from warpsplat.drawing.trace.cubics import handles_through
 from warpsplat.drawing.trace.curves import Pieces, areas_of, fit_circles, fit_polylines
-from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.grids import NO_REGION, Floats, components
+from warpsplat.drawing.trace.outlines import find_boundary
+from warpsplat.drawing.trace.partition import find_partition
+from warpsplat.drawing.trace.planar import STEPS, find_loops
 from warpsplat.drawing.trace.polylines import Polylines
+from warpsplat.drawing.trace.regions import find_regions
 from warpsplat.drawing.trace.spans import Polyline
 
 
@@ -93,24 +99,6 @@ def test_a_rounded_square_is_lines_and_arcs() -> None:
     assert count_corners(np.concatenate(parts)) == 0
 
 
-def test_stairs_and_small_circles() -> None:
-    """A circle of 3 px radius turns everywhere and has no corner; each step of a stair has one."""
-    assert count_corners(ring(3.0, 20)) == 0
-    stair = np.array([(0, 0), (8, 0), (8, 8), (16, 8), (16, 16), (0, 16)], float)
-    assert count_corners(polygon(stair)) == 6
-
-
-def test_open_runs_end_where_they_are_told_to() -> None:
-    x = np.arange(1.0, 40)
-    points = np.stack([x, 10 * np.sin(x / 12)], axis=1)
-    start, end = np.array([0.0, 0.0]), np.array([40.0, 10 * np.sin(40 / 12)])
-    (pieces,) = fit_polylines([Polyline(points, False, start, end)], [0.2])
-    assert np.allclose(pieces.cubics[0, 0], start) and np.allclose(pieces.cubics[-1, 3], end)
-    assert len(pieces.cubics) <= 3
-    shown = sampled(pieces.cubics, 200)
-    assert np.hypot(*(points[:, None] - shown[None]).transpose(2, 0, 1)).min(axis=1).max() < 0.25
-
-
 def test_many_runs_are_fitted_as_each_alone() -> None:
     rng = np.random.default_rng(1)
     star = np.array([(0, 0), (9, 30), (40, 41), (10, 50), (1, 80), (-9, 50), (-40, 40), (-11, 30)], float)
@@ -121,3 +109,99 @@ def test_many_runs_are_fitted_as_each_alone() -> None:
     for alone, run in zip(fit_polylines(runs, [0.2] * len(runs)), runs, strict=True):
         (pieces,) = fit_polylines([run], [0.2])
         assert np.allclose(pieces.cubics, alone.cubics, atol=1e-9) and (pieces.lines == alone.lines).all()
+
+
+CURVES = {
+    "arc": [[0, 0], [0, 5.5], [4.5, 10], [10, 10]],
+    "long": [[0, 0], [30, 2], [60, 30], [61, 50]],
+    "wave": [[0, 0], [10, 12], [14, -9], [25, 3]],
+    "flat": [[0, 0], [5, 0.1], [9, 0.1], [16, 0]],
+}
+
+
+def halves(cubic: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """A cubic in two at ``t``, by de Casteljau's rule."""
+    rows = [cubic]
+    while len(rows[-1]) > 1:
+        rows.append(rows[-1][:-1] * (1 - t) + rows[-1][1:] * t)
+    return np.stack([row[0] for row in rows]), np.stack([row[-1] for row in rows[::-1]])
+
+
+@pytest.mark.parametrize("t", [0.2, 0.5, 0.7])
+@pytest.mark.parametrize("name", CURVES)
+def test_the_halves_of_a_cubic_are_one_again(name: str, t: float) -> None:
+    cubic = np.array(CURVES[name], float)
+    handles = handles_through(*halves(cubic, t))
+    made = np.stack([cubic[0], *handles, cubic[3]])
+    s = np.linspace(0, 1, 200)
+    apart = np.linalg.norm(points_at(cubic, s)[:, None] - points_at(made, s), axis=2).min(axis=1)
+    assert apart.max() < 0.02 * np.linalg.norm(cubic[3])
+
+
+def test_many_at_once_are_as_each_alone() -> None:
+    rng = np.random.default_rng(1)
+    first, second = rng.normal(0, 5, (2, 30, 4, 2))
+    second[:, 0] = first[:, 3]
+    first[::5, 1] = first[::5, 0]
+    first[7] = second[7] = 0
+    alone = [handles_through(a, b) for a, b in zip(first, second, strict=True)]
+    np.testing.assert_allclose(handles_through(first, second), alone, atol=1e-9)
+
+
+def test_each_crack_ends_where_the_next_begins() -> None:
+    labels, _ = components(
+        np.random.default_rng(0).integers(0, 3, (20, 20)).astype(np.int32), np.zeros((20, 20, 4))
+    )
+    loops = find_loops(labels, np.zeros((20, 20, 4), np.float32))
+    for i in range(len(loops)):
+        part = slice(loops.first[i], loops.first[i + 1])
+        ends = loops.vertices[part] + STEPS[loops.directions[part]]
+        assert (ends == np.roll(loops.vertices[part], -1, axis=0)).all()
+    outer = loops.region[~loops.is_hole]
+    assert sorted(outer.tolist()) == list(range(labels.max() + 1)), "each region has one loop around it"
+
+
+@pytest.mark.parametrize("dark", [True, False])
+def test_a_diagonal_line_is_connected(dark: bool) -> None:
+    """Of two colours that cross on a diagonal, the one that there is less of goes on."""
+    painted = np.zeros((12, 12), np.int32)
+    painted[np.arange(12), np.arange(12)] = 1
+    image = np.repeat(np.where((painted == 1) == dark, 0, 200)[..., None], 4, axis=2).astype(np.float32)
+    labels, _ = components(painted, image)
+    assert len(np.unique(labels[painted == 1])) == 1
+    loops = find_loops(labels, image)
+    assert sorted(loops.region[~loops.is_hole].tolist()) == [0, 1, 2]
+
+
+SLOPES = [0.0, 0.1, -0.3, 0.7, 1.0, 1.4, -3.0]
+
+
+@pytest.mark.parametrize("slope", SLOPES)
+def test_straight_edges_are_exact(slope: float) -> None:
+    low, high = (48.3 + slope * (x - 48) for x in (-200, 296))
+    body = ground("#102030") + f'<path d="M-200 {low}L296 {high}V900H-200Z" fill="#f0c090"/>'
+    image = levels(draw_exactly(body))
+    found = find_partition(find_regions(image))
+    assert len(found.paint) == 2
+    loops = find_loops(found.labels, found.fills)
+    boundary = find_boundary(loops, found)
+    points = boundary.points / found.scale
+    inner = boundary.is_good & (loops.others != NO_REGION) & (np.abs(points - 48) < 40).all(axis=1)
+    x, y = points[inner].T
+    off = (y - 48.3 - slope * (x - 48)) / np.hypot(1, slope)
+    assert len(off) > 50
+    assert np.abs(off).max() < 0.06
+    assert np.abs(off).mean() < 0.02
+
+
+def test_cracks_without_antialiasing_stay() -> None:
+    image = levels(
+        draw(ground("#fff") + '<rect x="10" y="20" width="30" height="9" fill="#123"/>', hard=True)
+    )
+    found = find_partition(find_regions(image))
+    loops = find_loops(found.labels, found.fills)
+    inner = (loops.others != NO_REGION) & (loops.vertices > 0).all(axis=1)
+    inner &= (loops.vertices < 96 * found.scale).all(axis=1)
+    x, y = (find_boundary(loops, found).points / found.scale)[inner].T
+    off = np.minimum(np.abs(x[:, None] - [10, 40]).min(axis=1), np.abs(y[:, None] - [20, 29]).min(axis=1))
+    assert inner.any() and not off.any()

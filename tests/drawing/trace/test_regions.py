@@ -5,9 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.drawing.trace.drawings import draw, ground, levels, star
+from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
+from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.fewer import fewer_regions
+from warpsplat.drawing.trace.grids import NO_REGION, components
+from warpsplat.drawing.trace.inks import with_inks
+from warpsplat.drawing.trace.nesting import find_nesting
+from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.partition import Partition, find_partition
 from warpsplat.drawing.trace.regions import Regions, find_regions
+from warpsplat.drawing.trace.trace import trace
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import FloatArray
 
 
 def colors_of(found: Regions) -> set[tuple[int, ...]]:
@@ -97,3 +106,190 @@ def test_paper_between_dense_lines_is_paper() -> None:
     paper = image[30:66, 30:66, 0] > 160
     assert paper.any()
     assert (inner[paper] > 200).mean() > 0.9
+
+
+LETTERS = (
+    '<g fill="none" stroke="#113366" stroke-width="1.1">'
+    '<circle cx="6.3" cy="9.2" r="2.4"/><circle cx="14.6" cy="9.4" r="2.2"/>'
+    '<path d="M20.4 6.5v5.2M24.7 6.5v5.2M29.3 3.2v8.5"/></g>'
+    '<circle cx="20.4" cy="4.1" r="0.8" fill="#113366"/><circle cx="24.7" cy="4.1" r="0.8" fill="#113366"/>'
+)
+"""Two letters "o", two "i" and an "l", 12 px high."""
+
+
+@pytest.fixture(scope="module")
+def letters() -> FloatArray:
+    return draw_exactly(ground("#ffffff", 36, 16) + LETTERS, 36, 16)
+
+
+@pytest.fixture(scope="module")
+def small(letters: FloatArray) -> Partition:
+    return find_partition(find_regions(levels(letters)))
+
+
+def test_letters_have_one_ink_their_counters_and_their_dots(small: Partition) -> None:
+    assert len(np.unique(small.paint)) == 2
+    # The paper, two counters; two rings, two stems with a dot each, and the "l".
+    assert len(small.paint) == 1 + 2 + 2 + 4 + 1
+
+
+def test_a_trace_of_small_letters_is_near_their_source_at_four_times_the_size(letters: FloatArray) -> None:
+    large = draw_exactly(f'<g transform="scale(4)">{ground("#ffffff", 36, 16)}{LETTERS}</g>', 144, 64)
+    shown = render(trace(letters).scene, scale=4)
+    assert decibels(shown, large) > 23
+
+
+def test_tips_are_no_parts_of_their_own() -> None:
+    points = (180, 40), (196, 84), (240, 88), (206, 116), (218, 160), (180, 136), (142, 160), (154, 116)
+    star = "".join(f"L{x / 4.1:.2f} {y / 4.1:.2f}" for x, y in points).replace("L", "M", 1)
+    image = draw_exactly(ground("#ffffff", 64, 44) + f'<path d="{star}z" fill="#143cb4"/>', 64, 44)
+    found = find_partition(find_regions(levels(image)))
+    assert found.scale > 1
+    assert len(found.paint) == 2
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_regions_of_random_maps_keep_the_areas_of_each_pixel(seed: int) -> None:
+    """Without antialiasing a share is off by a half at the most."""
+    rng = np.random.default_rng(seed)
+    height, width = rng.integers(8, 41, 2)
+    painted = rng.integers(0, 2 + seed % 3, (height, width)).astype(np.int32)
+    palette = np.array(
+        [[255, 255, 255, 255], [200, 30, 20, 255], [20, 30, 120, 255], [0, 0, 0, 255]], np.float32
+    )
+    image = palette[painted]
+    labels, paint = components(painted, image)
+    regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
+    found = find_partition(regions)
+    shown = found.paint[found.labels].reshape(height, found.scale, width, found.scale)
+    own = (shown == painted[:, None, :, None]).mean(axis=(1, 3))
+    assert own.min() > 0.4 and own.mean() > 0.6
+
+
+def test_lines_of_a_third_of_a_pixel_are_whole() -> None:
+    """An ink drawing, smaller than its lines are wide."""
+    curves = "".join(f'<path d="M{4 + 8 * i} 60Q{20 - 6 * i} 30 {8 * i + 2} 4"/>' for i in range(8))
+    image = draw_exactly(
+        ground("#ffffff", 64, 64) + f'<g fill="none" stroke="#000" stroke-width=".7">{curves}</g>', 64, 64
+    )
+    shown = render(trace(image).scene)
+    assert decibels(shown, image) > 24
+
+
+def test_outlines_go_straight_on_at_the_border_of_the_image() -> None:
+    image = draw_exactly(ground("#ffffff", 48, 48) + '<circle cx="24" cy="24" r="24" fill="#000"/>', 48, 48)
+    shown = render(trace(image).scene)
+    assert decibels(shown, image) > 39.5
+
+
+WHITE = np.full(4, 255, np.float32)
+
+
+def grey(value: float) -> np.ndarray:
+    return np.array([value, value, value, 255], np.float32)
+
+
+def stroke(ink: float, shown: float) -> Regions:
+    """A bar of 24x5 px that is taken for one of a darker ink than its pixels show."""
+    labels = np.zeros((16, 32), np.int32)
+    labels[5:10, 4:28] = 1
+    colorings = [Coloring(WHITE), Coloring(grey(ink))]
+    fills = np.array([coloring.color for coloring in colorings])[labels]
+    image = np.where(labels[..., None] == 1, grey(shown), WHITE).astype(np.float32)
+    return Regions(image, labels, fills, np.arange(2, dtype=np.int32), colorings, 0.0)
+
+
+def best_colors_of(regions: Regions) -> list[float]:
+    partition = with_best_colors(find_partition(regions), regions)
+    return [float(coloring.color[0]) for coloring in partition.colorings]
+
+
+def test_ink_has_the_colour_of_its_pixels() -> None:
+    paper, ink = best_colors_of(stroke(0, 60))
+    assert paper == 255
+    assert abs(ink - 60) < 4
+    assert best_colors_of(stroke(60, 60)) == best_colors_of(stroke(60, 61)) == [255, 60], "up to rounding"
+
+
+def test_lines_keep_their_ink_where_webp_leaves_tints_around_them() -> None:
+    """No region lies near most of these: they tell nothing of the ink."""
+    arcs = ""
+    for i in range(14):
+        radius, ends = 18 + 8 * i, np.radians([20 * i, 20 * i + 250])
+        (a, b), (c, d) = (128 + radius * np.stack([np.cos(ends), np.sin(ends)], axis=1)).tolist()
+        arcs += f'<path d="M{a} {b}A{radius} {radius} 0 1 1 {c} {d}"/>'
+    body = f'{ground("#ffffff", 256, 256)}<g fill="none" stroke="#1d3557" stroke-width="1.5">{arcs}</g>'
+    image = draw_exactly(body, 256, 256)
+    assert decibels(render(trace(as_file(image, "webp", quality=80)).scene), image) > 20
+
+
+BROWN, BLUE = (120, 80, 40), (60, 110, 160)
+
+
+def drawn(*lines: tuple[str, tuple[int, int, int]]) -> FloatArray:
+    """Return lines of a pixel in width on a pale ground."""
+    paths = "".join(
+        f'<path d="{data}" fill="none" stroke="rgb{color}" stroke-width="1"/>' for data, color in lines
+    )
+    return draw_exactly(ground("#ffffd0", 64, 64) + paths, 64, 64)
+
+
+def inks_of(image: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the colours of an image's pixels if they were covered, and those that are not its ground's."""
+    found = with_inks(find_regions(levels(image)))
+    return found.fills, np.unique(
+        found.fills[np.abs(found.fills - found.fills[0, 0]).max(axis=2) > 9], axis=0
+    )
+
+
+def test_lines_that_touch_keep_their_colours() -> None:
+    image = drawn(("M4 60Q20 20 32 32", BROWN), ("M32 32Q50 50 60 10", BLUE))
+    fills, _ = inks_of(image)
+    thin = np.abs(fills - fills[0, 0]).max(axis=2) > 9
+    assert thin[:, :28].any() and thin[:, 36:].any()
+    for part, own, other in ((np.s_[:, :28], BROWN, BLUE), (np.s_[:, 36:], BLUE, BROWN)):
+        shown = fills[part][thin[part]][:, :3]
+        nearer = np.abs(shown - own).sum(axis=1) < np.abs(shown - other).sum(axis=1)
+        assert nearer.mean() > 0.95
+
+
+@pytest.mark.parametrize("color", [BROWN, BLUE])
+def test_lines_of_one_colour_have_one_ink(color: tuple[int, int, int]) -> None:
+    _, inks = inks_of(drawn(("M4 60Q20 20 32 32", color), ("M10.3 10.2L50.1 14.8", color)))
+    assert len(inks) == 1
+    assert np.abs(inks[0, :3] - color).max() < 32
+
+
+def _rings(*opacities: float) -> Regions:
+    """Squares inside one another, black, on a clear ground."""
+    labels = np.zeros((48, 48), np.int32)
+    for number in range(1, len(opacities) + 1):
+        labels[4 * number : 48 - 4 * number, 4 * number : 48 - 4 * number] = number
+    colorings = [Coloring(np.array([0, 0, 0, opacity]), is_band=True) for opacity in (0.0, *opacities)]
+    colorings[0] = Coloring(np.zeros(4))
+    fills = np.array([coloring.color for coloring in colorings], np.float32)[labels]
+    return Regions(fills, labels, fills, np.arange(len(colorings)), colorings, 0.0)
+
+
+def test_a_darker_band_lies_on_the_fainter_one_around_it() -> None:
+    regions = _rings(20, 80, 140)
+    nesting = find_nesting(regions)
+    assert nesting.parent.tolist() == [NO_REGION, NO_REGION, 1, 2]
+    assert nesting.depth.tolist() == [0, 0, 1, 2]
+    assert nesting.shown(0).tolist() == [0, 1, 1, 1]
+    assert nesting.shown(1).tolist() == [0, 1, 2, 2]
+    through = 1.0
+    for region, wanted in ((1, 20), (2, 80), (3, 140)):
+        through *= 1 - nesting.colorings[region].color[3] / 255
+        assert abs(255 * (1 - through) - wanted) < 0.01
+    assert nesting.ordered(np.array([-1, 5, 7, 9])).tolist() == [-1, 0, 1, 2]
+
+
+def test_a_dark_ring_lies_on_the_fainter_band_inside_it() -> None:
+    nesting = find_nesting(_rings(80, 20))
+    assert nesting.parent.tolist() == [NO_REGION, 2, NO_REGION]
+    assert nesting.colorings[2].color[3] == 20
+
+
+def test_nothing_lies_on_a_band_that_is_too_faint_to_be_painted() -> None:
+    assert find_nesting(_rings(2, 20, 80)).parent.tolist() == [NO_REGION, NO_REGION, NO_REGION, 2]
