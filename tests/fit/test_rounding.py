@@ -1,29 +1,31 @@
-"""Rounding in stages: what is frozen at each, which grid is taken, and what a run ends with."""
+"""Rounding in stages, and outlines drawn back from what is empty."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for
-from tests.scenes import CURVES, mixed_scene, random_scene, started_alike
+from tests.scenes import CURVES, disc, mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
+from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import (
     choose_grid,
-    freeze_opacities,
 )
 from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import ExactModel
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import OPACITY_RANGE, Basis, FloatArray, Kind, Scene
+from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import premultiplied, render_own
 from warpsplat.svg.write import GRIDS, rounded
 
 SETTINGS = make_settings(iterations=100)
@@ -42,36 +44,6 @@ def step_of(scene: Scene, device: str, image: FloatArray | None = None) -> Step:
     step = step_for(scene, picture() if image is None else image, device, SETTINGS)
     advanced(step)
     return step
-
-
-def opacity_step(device: str) -> Step:
-    """Return a step whose image shows all shapes but one."""
-    scene = mixed_scene(64, 48)
-    hidden = random_scene(Kind.FILL, 1, 64, 48, seed=9)
-    hidden = replace(hidden, points=hidden.points - np.float32(1000))
-    image = render(scene, backend=Backend.on(device))
-    noise = np.random.default_rng(0).normal(0, 0.02, image.shape)
-    return step_of(scene.append(hidden), device, (image + noise).astype(np.float32))
-
-
-def test_opacities_are_frozen_at_tenths_or_opaque(device: str) -> None:
-    step = opacity_step(device)
-    before = step.state.scene()
-    before.opacities[:4] = [0.02, 0.051, 0.149, 0.5]
-    step.state.parameters.assign(before)
-    freeze_opacities(step)
-    after = step.state.scene()
-    opaque = after.opacities == OPAQUE
-    assert opaque[-1], "nobody sees it: it is worth no byte"
-    assert not opaque.all(), "others are"
-    wanted = np.clip(np.round(before.opacities[~opaque].astype(np.float64), 1), 0.1, OPACITY_RANGE[1])
-    np.testing.assert_array_equal(after.opacities[~opaque], wanted.astype(np.float32))
-    for name in ("points", "colors", "widths"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
-    moved = advanced(step)
-    np.testing.assert_array_equal(moved.opacities, after.opacities)
-    assert (moved.colors != after.colors).any()
-    assert (moved.points != after.points).any()
 
 
 @pytest.mark.parametrize("staged", [True, False])
@@ -127,3 +99,34 @@ def test_runs_of_few_steps_keep_to_the_precision(device: str, iterations: int, p
     settings = make_settings(curves=6, iterations=iterations, precision=precision)
     made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     assert made.per_pixel <= 10**precision
+
+
+PLAIN = make_settings()
+
+
+def shown(scene: Scene) -> np.ndarray:
+    return premultiplied(render_own(export(scene, PLAIN, 10.0))) / 255
+
+
+def spilling() -> tuple[Scene, np.ndarray]:
+    """Return a disc, and the image of a smaller one."""
+    scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
+    return scene, shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
+
+
+def test_outlines_are_drawn_back_no_further_than_needed(device: str) -> None:
+    scene, target = spilling()
+    empty = target[..., 3] == 0
+    assert shown(scene)[empty].any()
+    cleared = clear_empty(scene, target, PLAIN, Run(Backend.on(device)), 10.0)
+    assert not shown(cleared)[empty].any()
+    assert np.abs(cleared.points - scene.points).max() < 1.5
+    late = Run(Backend.on(device), deadline=-math.inf)
+    assert clear_empty(scene, target, PLAIN, late, 10.0) is scene
+
+
+def test_a_clear_scene_stays_as_it_is(device: str) -> None:
+    scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE)
+    scene = replace(scene, canvas=Canvas(40, 36, None))
+    cleared = clear_empty(scene, shown(scene), PLAIN, Run(Backend.on(device)), 10.0)
+    np.testing.assert_array_equal(cleared.points, rounded(scene, 10.0).points)

@@ -1,6 +1,4 @@
-"""Kernels of the trials: two losses (``tests/fit/test_new_loss.py``), an attribute
-(``tests/scene/test_new_attribute.py``), elementary functions (``test_elementary.py``).
-"""
+"""Kernels for tests: two losses (``tests/fit/test_new_loss.py``), elementary functions."""
 
 import functools
 from typing import Any
@@ -49,19 +47,6 @@ def thin_backward(
     """Add the gradient of ``weight`` x the sum of the opacities."""
     shape = offset + wp.tid()
     opacities_grad[shape] = opacities_grad[shape] + weight
-
-
-@wp.kernel
-def glow_backward(
-    # In:
-    offset: wp.int32,
-    glows: wp.array[wp.vec3],  # [shape_count]
-    aim: wp.vec3,
-    # Out:
-    glows_grad: wp.array[wp.vec3],  # [shape_count] written
-):
-    shape = offset + wp.tid()
-    glows_grad[shape] = glows[shape] - aim
 
 
 @wp.kernel

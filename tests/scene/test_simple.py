@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from warpsplat.run.svg import load_svg
-from warpsplat.scene import Kind, Rule, Scene
-from warpsplat.scene.attributes import Basis
+from warpsplat.scene import Scene
 from warpsplat.scene.connected import separated
 from warpsplat.scene.cutout import cut_out
 from warpsplat.scene.intersections import intersections, parts
-from warpsplat.scene.simple import PAINTED, area, bounding, polygon, rings_of, simple, simple_rings
+from warpsplat.scene.simple import rings_of, simple
 from warpsplat.svg.viewer import render_svg
 from warpsplat.svg.write import write_svg
 
@@ -91,11 +90,6 @@ def test_a_ring_with_a_node_on_one_of_its_lines_is_two() -> None:
     np.testing.assert_allclose(pixels(made), pixels(scene), atol=0.02)
 
 
-def test_rings_without_an_area_go() -> None:
-    made = simple(scene_of('d="M8 8H48V40H8zM10 10L20 20L10 10zM30 30v.1h.1z" fill="red"'), 16)
-    assert len(made.contours_of(0)) == 1
-
-
 def test_a_cubic_crosses_itself_once() -> None:
     cubic = np.array([[(0, 0), (40, 30), (-10, 30), (30, 0)]], np.float64)
     pairs, places = intersections(cubic)
@@ -160,16 +154,6 @@ def test_what_is_covered_is_left_out_and_translucent_shapes_hide_nothing() -> No
     below, above = 'd="M20 20h9v9h-9z" fill="red"', 'd="M10 10h40v40h-40z" fill="blue"'
     assert len(cut_out(scene_of(below, above), 16)) == 1
     assert len(cut_out(scene_of(below, f'{above} fill-opacity=".5"'), 16)) == 2
-
-
-def test_the_rings_of_a_shape_run_around_its_paint() -> None:
-    scene = scene_of('d="M10 10V50H50V10zM20 20V40H40V20z" fill-rule="evenodd"')
-    rings = rings_of(scene, 0, 16)
-    painted = PAINTED[Rule.EVENODD]
-    made = bounding(simple_rings(rings, painted, 0), painted)
-    assert [area(polygon(ring)) > 0 for ring in made] == [True, False]
-    assert scene.kind[0] == Kind.FILL
-    assert scene.basis[0] == Basis.CUBIC
 
 
 def test_fills_of_one_colour_become_one() -> None:
