@@ -14,16 +14,10 @@ from tests.scenes import random_scene
 from warpsplat.cli.run import summary
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.paper.renderers import fold_weight
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import render_figures
 from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
-
-
-def test_the_fold_weight_grows_geometrically() -> None:
-    settings = make_settings(iterations=100, fold_start=0.1, fold_end=10.0)
-    assert [fold_weight(settings, n) for n in (0, 50, 100)] == pytest.approx([0.1, 1.0, 10.0])
 
 
 def test_paper_options_run(device: str) -> None:

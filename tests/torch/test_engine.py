@@ -1,4 +1,4 @@
-"""Engines that are kept: as few as needed, and no more than allowed."""
+"""Engines that are kept: as few as needed, and no more than allowed; several scenes in one call."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from warpsplat.errors import UsageError
 from warpsplat.rendering import kernel_cache
 from warpsplat.scene import Cap, Join, Kind, Scene
 from warpsplat.torch import SceneTensors, clear_cache, kept, passes, render
+from warpsplat.torch.engine import Engine
 
 
 def step(scene: Scene, width: int = 40) -> torch.Tensor:
@@ -60,17 +61,6 @@ def test_changing_scenes_do_not_compile(monkeypatch: pytest.MonkeyPatch) -> None
     for count in range(3, 8):
         step(random_scene(Kind.FILL, count))
     assert len(kept.engines) == 3
-
-
-def test_bytes_are_counted_and_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = random_scene(Kind.FILL, 2)
-    step(scene)
-    step(scene, 800)
-    small, large = (each.bytes for _, each in kept.engines)
-    assert 50_000 < small < large / 20
-    monkeypatch.setattr(kept, "_limit", lambda device: 1)
-    step(random_scene(Kind.FILL, 3))
-    assert len(kept.engines) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
@@ -140,3 +130,89 @@ def test_a_graph_of_what_was_not_rendered_before_is_refused(capturing: Callable[
     capturing(True)
     with pytest.raises(UsageError, match="rendered before"):
         step(random_scene(Kind.FILL, 3))
+
+
+Tensor = torch.Tensor
+
+
+@pytest.fixture
+def renders(monkeypatch: pytest.MonkeyPatch) -> list[Engine]:
+    """Start without renderers; the one of each forward pass is added to the list."""
+    clear_cache()
+    done: list[Engine] = []
+    own = Engine.forward
+
+    def counted(engine: Engine, values: dict[str, Tensor]) -> None:
+        done.append(engine)
+        own(engine, values)
+
+    monkeypatch.setattr(Engine, "forward", counted)
+    return done
+
+
+def shifted(count: int) -> list[Scene]:
+    """Return scenes of one structure."""
+    scene = random_scene(Kind.FILL, 5)
+    return [replace(scene, points=scene.points + np.float32(i)) for i in range(count)]
+
+
+def mixed() -> list[Scene]:
+    """Return scenes of several structures, one of them opaque."""
+    opaque = replace(random_scene(Kind.FILL, 4), opacities=np.ones(4, np.float32))
+    return [*shifted(2), random_scene(Kind.STROKE, 3), opaque]
+
+
+def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[Tensor]:
+    """Return images and gradients."""
+    tensors = [SceneTensors.of(scene, requires_grad=True) for scene in scenes]
+    wanted = [[v for v in each.values.values() if v.requires_grad] for each in tensors]
+    height, width = scenes[0].canvas.height, scenes[0].canvas.width
+    weights = torch.rand(len(scenes), height, width, 4, generator=torch.Generator().manual_seed(0))
+    if at_once:
+        images = render(tensors, threads=threads)
+        leaves = [leaf for own in wanted for leaf in own]
+        return [*images.detach(), *torch.autograd.grad(images, leaves, weights)]
+    images = torch.stack([render(each, threads=threads) for each in tensors])
+    gradients = [
+        torch.autograd.grad(render(each, threads=threads), own, weight)
+        for each, own, weight in zip(tensors, wanted, weights, strict=True)
+    ]
+    return [*images.detach(), *(gradient for own in gradients for gradient in own)]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+@pytest.mark.parametrize("scenes", [shifted(5), mixed(), shifted(1)], ids=["shifted", "mixed", "one"])
+def test_bits_are_those_of_single_calls(scenes: list[Scene], threads: int) -> None:
+    for one, other in zip(found(scenes, threads, at_once=True), found(scenes, 1, at_once=False), strict=True):
+        assert torch.equal(one, other)
+
+
+def test_without_memory_images_are_rendered_again(
+    renders: list[Engine], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = found(shifted(4), 1, at_once=True)
+    clear_cache()
+    renders.clear()
+    monkeypatch.setattr(kept, "_limit", lambda device: 1)
+    assert all(map(torch.equal, found(shifted(4), 1, at_once=True), wanted))
+    assert len(set(renders)) == 1
+    assert len(renders) == 4 + 3  # the last image is still there
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_scene_that_cannot_be_drawn_is_refused(threads: int) -> None:
+    scenes = [SceneTensors.of(scene) for scene in shifted(3)]
+    scenes[1].values["points"][0, 0] = float("nan")
+    with pytest.raises(ValueError, match="points: numbers that are not finite"):
+        render(scenes, threads=threads)
+    assert torch.equal(render(scenes[::2], threads=threads)[1], render(scenes[2]))
+
+
+def test_part_of_the_images_and_part_of_the_tensors() -> None:
+    tensors = [SceneTensors.of(scene) for scene in shifted(3)]
+    tensors[1].values["colors"].requires_grad_()
+    render(tensors)[1].sum().backward()
+    alone = tensors[1].values["colors"].detach().clone().requires_grad_()
+    render(SceneTensors(tensors[1].layout, {**tensors[1].values, "colors": alone})).sum().backward()
+    assert alone.grad is not None
+    assert torch.equal(alone.grad, tensors[1].values["colors"].grad)

@@ -12,7 +12,6 @@ import warpsplat
 from tests.scenes import contours_scene
 from warpsplat.errors import UsageError
 from warpsplat.paper.chains import as_chains
-from warpsplat.paper.models import SplatModel
 from warpsplat.scene import Kind, Rule, Scene
 from warpsplat.torch import SceneTensors, render
 
@@ -60,8 +59,3 @@ def test_what_has_no_such_form_is_refused_in_one_line() -> None:
             UsageError, match="several contours, which the renderer splat cannot draw; the renderer exact"
         ):
             draw(scene, renderer="splat")
-
-
-def test_a_model_itself_takes_cubics_only() -> None:
-    with pytest.raises(ValueError, match="is a spline, not cubics"):
-        render(start(open=False), renderer=SplatModel())
