@@ -17,7 +17,6 @@ from tests import fake_cuda
 from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
 from warpsplat.rendering import kernel_cache
-from warpsplat.rendering.cuda import runtime
 from warpsplat.rendering.kernel_cache import LOCK, load
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
@@ -70,16 +69,6 @@ def test_a_damaged_cache_is_rebuilt(cache: Path, ending: str) -> None:
         assert doubles(), size
         assert find(cache, ".o").read_bytes() == good
     assert len(list(cache.glob("wp_*"))) == 1, "what was damaged is gone"
-
-
-def test_a_whole_cache_is_used_as_it_is(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert doubles()
-
-    def refuse(*_: object, **__: object) -> None:
-        raise AssertionError("compiled again")
-
-    monkeypatch.setattr(_double.module, "_run_codegen", refuse)
-    assert doubles()
 
 
 def test_what_another_processor_left_is_not_used(cache: Path) -> None:
@@ -194,21 +183,6 @@ def test_what_a_compiler_refuses_is_shown_in_its_words(
     with pytest.raises(DeviceError, match=r"cannot be compiled for the CPU: .*: error: unknown type 'floot'"):
         doubles()
     assert len(tries) == 1 and "WARP_CACHE_PATH" not in caplog.text
-
-
-def test_a_module_that_cannot_be_loaded_although_it_is_whole(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert doubles()
-    good = find(cache, ".o").read_bytes()
-    with monkeypatch.context() as patch:
-        patch.setattr(runtime().llvm, "wp_load_obj", lambda *_: 1)
-        with pytest.raises(
-            DeviceError, match=r"kernels cannot be loaded on the CPU: Failed to load CPU module"
-        ):
-            doubles()
-    assert find(cache, ".o").read_bytes() == good, "compiled again, in case that it was damaged"
-    assert doubles()
 
 
 @pytest.mark.parametrize(

@@ -59,13 +59,15 @@ def test_arguments_go_where_their_names_are(device: str, threads: int) -> None:
         np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
 
 
-def test_arrays_live_as_long_as_the_program(device: str) -> None:
+@pytest.mark.parametrize("is_view", [False, True])
+def test_arrays_live_as_long_as_the_program(device: str, is_view: bool) -> None:
     """Recorded launches hold their addresses only."""
     program, result = Program(wp.get_device(device)), floats(0, 0, 0, device=device)
     shift, slope = (floats(*x, device=device) for x in ([10, 20, 30], [1, 2, 3]))
     alive = weakref.ref(slope)
-    program.launch(affine, 3, shift=shift, slope=slope, factor=2.0, result=result)
-    del shift, slope
+    given = view(slope, wp.float32, (3,)) if is_view else slope
+    program.launch(affine, 3, shift=shift, slope=given, factor=2.0, result=result)
+    del shift, slope, given
     assert alive()
     program.run()
     np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
