@@ -19,7 +19,6 @@ from warpsplat.fit.schedule import Phase
 from warpsplat.fit.settings import Density, make_settings
 from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
-from warpsplat.kernels import constants
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, FloatArray, Scene
@@ -163,6 +162,7 @@ def test_a_logo_is_found_again(device: str, background: FloatArray | None) -> No
     assert psnr(off.scene, target, backend) < 27
     assert psnr(scene, target, backend) > 45
     assert_clean(off, scene)
+    assert psnr(fitted(target, exact, backend), target, backend) > 70, "what is exact stays"
     np.testing.assert_array_equal(scene.opacities, 1)
     np.testing.assert_array_equal(scene.colors, exact.scene.colors)
 
@@ -174,15 +174,6 @@ def test_seams_stay_closed(device: str) -> None:
     scene = fitted(target, off, backend)
     assert psnr(scene, target, backend) > psnr(off.scene, target, backend) + 10
     assert_clean(off, scene)
-
-
-def test_what_is_exact_stays(device: str) -> None:
-    """No result is worse than its start."""
-    backend = Backend.on(device)
-    exact = logo()
-    target = render(exact.scene, backend=backend)
-    scene = fitted(target, exact, backend)
-    assert psnr(scene, target, backend) > 70
 
 
 def test_a_picture_without_shapes(device: str) -> None:
@@ -212,7 +203,7 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
         Canvas(96, 80, background), (RED, [disc(49.0, 40.0, 30.0)]), (BLUE, [disc(55.0, 36.0, 22.0)])
     )
     target = render(replace(made.scene, points=made.scene.points + np.array([7, 3], np.float32)))
-    points, errors, still = [], [], []
+    points, errors = [], []
     for keeps in (False, True):
         state = FitState.start(made.scene, Backend.on(device, 1), np.random.default_rng(0))
         state.parameters.keeps_colors = keeps
@@ -221,22 +212,16 @@ def test_tiles_without_outlines_are_left_out(device: str, background: FloatArray
         settings = make_settings(texture=0.0, bending=0.0, rates={"points": 0.9, "colors": 0.0})
         settings = replace(settings, coarse=0.0, density=Density(interval=0))
         step = Step(state, settings, Target(target, Phase(96, 80, slack=1.0)))
-        figures, states = [], []
+        errors.append([])
         for _ in range(12):
             step.advance()
-            figures.append(step.loss_target.mean_square())
-            states.append(step.renderer.bins.buffers.tile_cache.numpy().copy())
+            errors[-1].append(step.loss_target.mean_square())
+        assert keeps == bool(np.any(step.renderer.bins.buffers.tile_cache.numpy()))
         step.render()
         assert step.measured_error() == pytest.approx(step.objective.square_error(), rel=1e-5)
         points.append(step.state.scene().points)
-        errors.append(figures)
-        still.append(states)
     np.testing.assert_array_equal(*points)
     assert errors[0] == errors[1]
-    assert not np.any(still[0])
-    same = np.stack(still[1]) == constants.CACHED
-    assert same[1:].any(axis=1).all(), "where nothing is to be found"
-    assert (same[1:-1] != same[2:]).any(), "outlines come and go"
 
 
 def test_level_edges_pass_small_minima(device: str) -> None:

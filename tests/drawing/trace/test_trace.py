@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import LOGO, STAR, decibels, draw, ground, photograph
-from warpsplat.drawing.trace.grids import components
-from warpsplat.drawing.trace.palette import Coloring
-from warpsplat.drawing.trace.partition import find_partition
-from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.seeds import noise_of
-from warpsplat.drawing.trace.trace import Traced, trace, trace_partition
+from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.metrics import psnr
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Paint
@@ -81,6 +77,7 @@ DRAWINGS = {
         35,
         3,
     ),
+    "translucent": ('<rect x="10" y="10" width="60" height="60" fill="#842" fill-opacity="0.5"/>', 45, 1),
     "letters of the ground": (  # on a band on a disc
         ground("#0a3") + '<circle cx="48" cy="48" r="44" fill="#fd0"/><rect x="14" y="30" width="68" '
         'height="36" fill="#fff"/><rect x="40" y="40" width="16" height="16" fill="#0a3"/>',
@@ -124,14 +121,6 @@ def test_what_lies_below_goes_on_below() -> None:
     assert traced.scene.point_counts()[disc] == 12
 
 
-def test_translucent_regions_keep_their_opacity() -> None:
-    image = draw('<rect x="10" y="10" width="60" height="60" fill="#804020" fill-opacity="0.5"/>')
-    traced = trace(image)
-    assert len(traced.scene) == 1
-    assert traced.scene.opacities[0] == pytest.approx(0.5, abs=0.01)
-    assert psnr_of(traced, image) > 45
-
-
 @pytest.mark.parametrize("most", [1, 2, 3])
 def test_a_limit_of_paths(most: int) -> None:
     assert 1 <= len(trace(draw(LOGO), most=most).scene) <= most
@@ -144,11 +133,12 @@ def test_photographs_are_traced_too() -> None:
     assert psnr_of(traced, photograph()) > 12
 
 
-@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 9, 4), (3, 3, 4)])
+@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 9, 4), (3, 3, 4), (4, 4, 3)])
 def test_the_smallest_pictures(shape: tuple[int, ...]) -> None:
     image = np.random.default_rng(0).random(shape).astype(np.float32)
     image[..., :3] *= image[..., 3:] if shape[2] == 4 else 1
-    traced = trace(image)
+    with np.errstate(all="raise"):  # around one pixel an outline has no direction
+        traced = trace(image)
     assert len(traced.joints) == len(traced.scene.points)
     assert np.isfinite(traced.scene.points).all()
 
@@ -158,18 +148,6 @@ def test_one_colour_and_nothing() -> None:
     assert len(white.scene) == 0 and white.scene.canvas.background is not None
     empty = trace(np.zeros((8, 8, 4), np.float32))
     assert len(empty.scene) == 0 and empty.scene.canvas.background is None
-
-
-def test_regions_of_single_pixels_are_traced() -> None:
-    """Around one pixel an outline has no direction."""
-    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 200, 255]], np.float32)
-    painted = np.random.default_rng(0).integers(0, 3, (4, 4)).astype(np.int32)
-    image = palette[painted]
-    labels, paint = components(painted, image)
-    regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
-    with np.errstate(all="raise"):
-        traced = trace_partition(find_partition(regions))
-    assert np.isfinite(traced.scene.points).all()
 
 
 def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them() -> None:
@@ -238,29 +216,19 @@ def test_a_shadow_that_fades_away_is_kept() -> None:
     assert shown[:8].max() == 0, "nothing is painted where nothing was"
 
 
-def test_a_slope_is_no_noise_but_grain_is() -> None:
-    ramp = np.round(np.broadcast_to(np.linspace(0, 240, 80)[:, None], (80, 80, 3)))
-    image = np.concatenate([ramp, np.full((80, 80, 1), 255.0)], axis=2).astype(np.float32)
-    assert noise_of(image) < 0.5
-    image[..., :3] += np.random.default_rng(0).normal(0, 4, (80, 80, 1))
-    assert noise_of(image) > 3
-    coarse = np.kron(2 * np.random.default_rng(0).integers(0, 2, (40, 40)), np.ones((2, 2)))
+def test_a_slope_and_a_map_have_no_noise_but_grain_is() -> None:
+    """Of a map every pixel is beside an edge, and some of its steps are small."""
+    rng = np.random.default_rng(0)
+    colors = np.array([(90, 30, 20), (100, 120, 30), (110, 150, 60)], np.float32)
+    ramp = np.round(np.broadcast_to(np.linspace(0, 240, 80)[:, None, None], (80, 80, 3)))
+    for plain in (ramp, colors[rng.integers(0, 3, (80, 80))]):
+        image = np.concatenate([plain, np.full((80, 80, 1), 255)], axis=2).astype(np.float32)
+        assert noise_of(image) < 1
+        image[..., :3] += np.round(rng.normal(0, 4, (80, 80, 1)))
+        assert noise_of(image) > 3
+    coarse = np.kron(2 * rng.integers(0, 2, (40, 40)), np.ones((2, 2)))
     image[..., :3] = 100 + coarse[..., None]  # steps of a scaled picture differ by no more than they are
     assert noise_of(image) == 2
-
-
-def test_a_map_without_flat_areas_has_no_noise_but_a_noisy_one_has() -> None:
-    """Every pixel is beside an edge, and some of its steps are small."""
-    colors = np.array([(90, 30, 20), (100, 120, 30), (110, 150, 60)], np.float32)
-    image = np.full((32, 32, 4), 255, np.float32)
-    image[..., :3] = colors[np.random.default_rng(0).integers(0, 3, (32, 32))]
-    assert noise_of(image) < 1
-    image[..., :3] += np.round(np.random.default_rng(0).normal(0, 4, (32, 32, 1)))
-    assert noise_of(image) > 3
-
-
-def test_what_is_uneven_on_one_ground_only_is_no_noise() -> None:
-    opacity = np.random.default_rng(0).normal(128, 6, (80, 80, 1)).astype(np.float32)
+    opacity = rng.normal(128, 6, (80, 80, 1)).astype(np.float32)
     assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white
-    dirt = np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)
-    assert noise_of(dirt) > 1
+    assert noise_of(np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)) > 1
