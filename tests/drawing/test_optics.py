@@ -92,27 +92,6 @@ def untouched(image: FloatArray, over: Callable[[], bool] = lambda: False) -> tu
     return result, times
 
 
-@pytest.mark.parametrize("how", MADE)
-def test_a_sharp_image_tells_how_a_picture_was_made(how: str) -> None:
-    """Through the optics it is the picture, which without them is what means of pixels would be."""
-    picture, fine = pixels(MADE[how]()), pixels(small(BOX, SCALE))
-    seen = Seen.of(picture)
-    found = seen.find(fine, light(SCALE) / np.float32(255) if seen.edges.is_linear else None)
-    plain = pixels(small(BOX))
-    assert seen.edges.is_linear == (how == "in linear light")
-    assert decibels(found.shown, picture) > decibels(plain, picture) + 8
-    assert decibels(found.undone, plain) > decibels(picture, plain) + 8
-    assert found.error < found.without / 5
-
-
-@pytest.mark.parametrize("color", [(0.3, 0.3, 0.3), (1, 1, 1)])
-def test_an_image_without_edges_tells_nothing(color: tuple[float, ...]) -> None:
-    flat = np.full((20, 30, 3), color, np.float32)
-    found = Seen.of(flat).find(np.full((40, 60, 3), color, np.float32))
-    assert found.kernel == NONE and found.error == found.without == 0
-    np.testing.assert_allclose(found.undone, flat, atol=0.003)
-
-
 def test_means_and_steps_of_pixels_tell_nothing() -> None:
     """Any kernel that sharpens would explain steps."""
     found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))

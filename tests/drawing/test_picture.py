@@ -50,15 +50,6 @@ def drawn(image: FloatArray, quality: str) -> npt.NDArray[np.uint8]:
     return np.asarray(render_svg(made.svg).convert("RGB"))
 
 
-@pytest.mark.parametrize("margin", [(0, 0, 0, 0), (3, 0, 0, 1), (40, 30, 5, 90), (300, 0, 0, 0)])
-def test_a_picture_has_a_margin_of_one_width(margin: tuple[int, int, int, int]) -> None:
-    plain, wide = Picture.of(image_of("thin")), Picture.of(padded(image_of("thin"), *margin))
-    assert np.array_equal(wide.pixels, plain.pixels)
-    assert (wide.corner == plain.corner + margin[:2]).all()
-    assert (wide.original_size == plain.original_size + margin[:2] + margin[2:]).all()
-    assert wide.drawn_share == plain.drawn_share
-
-
 def test_what_reaches_the_border_stays_as_it_is() -> None:
     image = image_of("thin")
     image[:, 0] = np.linspace(0, 1, 96)[:, None]

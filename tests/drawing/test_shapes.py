@@ -28,7 +28,6 @@ from tests.drawing.trace.test_curves import halves
 from warpsplat.drawing import prices
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
-from warpsplat.drawing.shapes import FAMILIES, Family, nearest
 from warpsplat.drawing.tidy import finish_drawing, tidied
 from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import make_settings
@@ -147,26 +146,6 @@ def test_what_an_image_shows_otherwise_stays() -> None:
     """A disc that is flat below, and a square with one corner cut off."""
     cut = polygon((44, 6), (64, 6), (64, 22), (60, 26), (44, 26))
     assert not found(drawing(SHEET, (RED, [flat(20, 20, 14)]), (BLUE, [cut])))
-
-
-VALUES = [30, 20, 12, 8], [30, 20, 9], [30, 20, 12, 6], [30, 20, 12, 8, 3]
-
-
-@pytest.mark.parametrize(("family", "wanted"), list(zip(FAMILIES, VALUES, strict=True)))
-def test_the_nearest_shape_is_the_one_that_it_was(family: Family, wanted: list[float]) -> None:
-    """A tenth of the points may be anywhere: another shape may hide what is there."""
-    made = family.shape(np.array(wanted, float))
-    low, high, radii = np.array(made.low), np.array(made.high), np.array(made.radii)
-    angle = np.linspace(0, 2 * np.pi, 96, endpoint=False)
-    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    if radii[0]:
-        points = (low + high) / 2 + np.sign(way) * ((high - low) / 2 - radii) + radii * way
-    else:
-        points = (low + high) / 2 + (high - low) / 2 * way / np.abs(way).max(axis=1, keepdims=True)
-    points[:9] += (0, 3)
-    values, off = nearest(family, points[None], np.ones((1, 96)))
-    np.testing.assert_allclose(values[0], wanted, atol=0.15)
-    assert off[0, 9:].max() < 0.2
 
 
 def test_equal_outlines_of_a_noisy_image_are_equal() -> None:

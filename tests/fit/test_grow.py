@@ -16,10 +16,10 @@ from warpsplat.fit.densification import PAIRS_PER_CHUNK, duplicates, prune_mask
 from warpsplat.fit.grow import new_shapes
 from warpsplat.fit.importance import BLACK_WEIGHT, TEXTURE_NOISE, pixel_weights, weights_at
 from warpsplat.fit.loop import fit
-from warpsplat.fit.place import circle_outlines, grid_scene, shape_angles, simple_curves
+from warpsplat.fit.place import circle_outlines, grid_scene, simple_curves
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Density, make_settings
-from warpsplat.fit.simplify import MIN_POINTS_BETWEEN, MIN_SPLINE_POINTS, simplify, without
+from warpsplat.fit.simplify import without
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Basis, FloatArray, Kind, Scene
@@ -41,12 +41,6 @@ def blobs(height: int, width: int) -> np.ndarray:
     rng = np.random.default_rng(0)
     small = rng.uniform(0, 1, (6, 8, 3)).astype(np.float32)
     return np.clip(cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC), 0, 1)
-
-
-def test_strokes_lie_along_contours() -> None:
-    stripes = np.repeat(np.sin(np.arange(96) / 3)[:, None, None], 96, axis=1).repeat(3, axis=2)
-    angle = shape_angles(make_settings(open=True), stripes.astype(np.float32), np.array([[48.0, 48.0]]), 6.0)
-    assert abs(np.cos(angle[0])) > 0.99
 
 
 def flag(bands: int) -> np.ndarray:
@@ -247,23 +241,3 @@ def test_area_and_neighbours_of_a_ring(kind: str) -> None:
     if kind == "circle":
         np.testing.assert_allclose(area, area[0], rtol=1e-3)
         assert counted[0] < 0.01 * areas(one(ring))[0]
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-@pytest.mark.parametrize("count", range(3, 16))
-def test_points_removed_together_are_apart_and_enough_are_left(kind: Kind, count: int) -> None:
-    beziers = count if kind == Kind.FILL else count - 2
-    scene = random_scene(kind, 5, basis=Basis.SPLINE, beziers=beziers, seed=count)
-    thin, keep = simplify(scene, np.ones(5, np.float32), 10_000)
-    assert (thin.point_counts() >= min(count, MIN_SPLINE_POINTS)).all()
-    if count > MIN_SPLINE_POINTS:
-        assert (thin.point_counts() < count).all()
-    for i in range(5):
-        gone = np.setdiff1d(np.arange(count * i, count * (i + 1)), keep)
-        if kind == Kind.STROKE:
-            np.testing.assert_array_equal(thin.points_of(i)[[0, -1]], scene.points_of(i)[[0, -1]])
-            assert (np.diff(gone) > MIN_POINTS_BETWEEN).all()
-        else:
-            steps = (gone[:, None] - gone[None, :]) % count
-            far = (steps > MIN_POINTS_BETWEEN) & (steps < count - MIN_POINTS_BETWEEN)
-            assert ((steps == 0) | far).all()

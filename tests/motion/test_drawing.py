@@ -68,14 +68,6 @@ def test_own_styles_and_classes_stay() -> None:
     assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(other)))
 
 
-def test_lengths() -> None:
-    assert drawing.path_length("M0 0h30v40") == pytest.approx(70)
-    circle = "M10 0a10 10 0 1 1-20 0a10 10 0 1 1 20 0z"
-    assert drawing.path_length(circle) == pytest.approx(2 * np.pi * 10, rel=0.01)
-    assert drawing.path_length("M0 0h3M0 9h5") == pytest.approx(5), "dashes restart at each subpath"
-    assert drawing.path_length("") == 0
-
-
 SCENE = mixed_scene()
 LESS, MOVED = SCENE.take(np.arange(1, len(SCENE))), replace(SCENE, points=SCENE.points + np.float32(1))
 

@@ -115,22 +115,6 @@ def test_gradients_have_unique_ids(recorded: Recorded, tmp_path: Path) -> None:
     assert scales[1:] == [1] * (len(scales) - 1)
 
 
-def test_the_number_of_scenes_and_bytes_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first and the last scene are kept, and early ones are denser."""
-    scene = mixed_scene()
-    scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
-    monkeypatch.setattr(recorder, "MAX_SCENES", 60)
-    made = recorder_of(scenes)
-    assert 30 < len(made.scenes) <= 60
-    assert [int(scene.widths[0]) for scene in made.scenes] == made.moments
-    assert (made.moments[0], made.moments[-1]) == (0, 249)
-    early, later = (sum(first <= moment < first + 50 for moment in made.moments) for first in (0, 120))
-    assert early > later
-    assert max(np.diff(made.moments)) < 20
-    monkeypatch.setattr(recorder, "MAX_BYTES", 10 * recorder._bytes_of(scene))
-    assert 5 <= len(recorder_of(scenes[:100]).scenes) <= 10
-
-
 def test_default_subject(recorded: Recorded, tmp_path: Path) -> None:
     made, result = recorded
     assert made.shows(result) == "training"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import math
 from dataclasses import replace
 
@@ -23,27 +22,22 @@ from tests.kernels.test_elementary import run
 from tests.paper.helpers import grid_of, plans_of
 from tests.paper.reference.grid import fold_area, grids
 from tests.reference.curves import tensors
-from tests.scenes import canvas, disc, mixed_scene, points_by_shape, random_scene, with_points
+from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
 from warpsplat.kernels.constants import TILE
 from warpsplat.metrics import psnr
 from warpsplat.paper.constants import COUNT_MAX, PLATEAU
 from warpsplat.paper.kernels.strips import bounded_product, normal_quantile, normal_tail
 from warpsplat.paper.models import SplatModel
-from warpsplat.paper.split import subcurve
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 CASES = [(FILL, n, 1.0) for n in (2, 4, 6)] + [(STROKE, n, 1.0) for n in (1, 2, 3, 4, 5)]
 CASES += [(FILL, 4, 0.6), (STROKE, 3, 1.7)]
-
-
-def splatted(scene: Scene, device: str) -> FloatArray:
-    return render(scene, model=SPLAT, backend=Backend.on(device))
 
 
 @pytest.mark.slow
@@ -98,38 +92,6 @@ def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
             if (high >= [TILE * tx, TILE * ty]).all() and (low < [TILE * (tx + 1), TILE * (ty + 1)]).all():
                 wanted.append(shape)
         assert listed == wanted[::-1]
-
-
-@pytest.mark.parametrize("radius", [4.0, 10.0, 25.0])
-def test_a_splatted_disc_covers_what_the_path_covers(device: str, radius: float) -> None:
-    size = int(2 * radius + 12)
-    image = splatted(disc(radius, size, size / 2 + 0.3), device)[..., 0]
-    centres = np.arange(size) + 0.5 - (size / 2 + 0.3)
-    distance = np.hypot(*np.meshgrid(centres, centres)) - radius
-    assert image.sum() == pytest.approx(np.pi * radius**2, rel=0.06)
-    assert image[distance < -1.5].min() > 0.95
-    assert image[distance > 1.5].max() < 0.1
-    assert image[np.abs(distance) < 0.2].mean() == pytest.approx(0.5, abs=0.12)
-
-
-@pytest.mark.parametrize("cuts", [(0.5,), (0.1, 0.15, 0.9), (0.01, 0.02, 0.03, 0.04), (0.2, 0.4, 0.6, 0.8)])
-def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tuple[float, ...]) -> None:
-    """One cubic cut into several, of equal and of unequal lengths."""
-    whole = np.array([[8, 50], [20, -10], [44, 80], [56, 10]], np.float64)
-    pieces = [subcurve(whole[None], a, b)[0] for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
-    chain = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
-    pictures = []
-    for points in (whole, chain):
-        scene = Scene.uniform(
-            STROKE,
-            canvas(64, 64),
-            points[None].astype(np.float32),
-            colors=np.ones((1, 3), np.float32),
-            opacities=np.full(1, 0.9, np.float32),
-            widths=np.full(1, 6, np.float32),
-        )
-        pictures.append(splatted(scene, device))
-    assert np.abs(pictures[0] - pictures[1]).mean() < 3e-3
 
 
 @pytest.mark.parametrize("seed", [0, 1])

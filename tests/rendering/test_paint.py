@@ -11,7 +11,6 @@ from tests.helpers import adjoint, compare, renderer_for
 from tests.scenes import disc, mixed_scene, picture_scene, random_scene, with_gradients, with_stops
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.rendering.tiles import from_tiles
 from warpsplat.scene import NO_PICTURE, Canvas, Kind, Paint, Picture, Scene, Spread
 
 
@@ -55,25 +54,6 @@ def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[fl
     """Gradients whose columns reach one interval, several, or lie beyond either end; two in one place."""
     scene = with_stops(random_scene(Kind.FILL, 6, seed=12), offsets, seed=13)
     compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
-
-
-def test_what_is_seen_is_what_colours_are_multiplied_with(device: str) -> None:
-    scene = with_stops(mixed_scene(seed=4), seed=5)
-    scene.opacities[:] = 0.6
-    before = renderer_for(scene, device)
-    visible = before.visible()
-    step = 0.125
-    for shape in range(len(scene)):
-        own = np.arange(len(scene)) == shape
-        stops = np.repeat(own, np.diff(scene.stop_first))[:, None]
-        brighter = replace(
-            scene, colors=scene.colors + step * own[:, None], stop_colors=scene.stop_colors + step * stops
-        )
-        grown = renderer_for(brighter, device).read_image() - before.read_image()
-        tiles = np.zeros((before.viewport.tile_count, 1, 16, 16), np.float32)
-        tiles[visible.tile[visible.shape == shape], 0] = visible.share[visible.shape == shape]
-        seen = from_tiles(tiles, before.viewport.width, before.viewport.height)
-        np.testing.assert_allclose(grown, step * np.broadcast_to(seen, grown.shape), atol=1e-6)
 
 
 def test_stops_out_of_order(device: str) -> None:

@@ -1,14 +1,12 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Kind, Scene
 
 SCENES = {
     "fills": (random_scene(Kind.FILL, count=6), random_scene(Kind.FILL, count=2, seed=1)),
@@ -45,25 +43,4 @@ def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scen
         for moment, old in zip((group.moment1, group.moment2), before[attribute.name], strict=True):
             np.testing.assert_array_equal(moment.numpy()[: len(rows)], old[rows])
             assert not moment.numpy()[len(rows) :].any()
-    assert parameters.revision == 1
-
-
-def test_fewer_points_keep_their_moments(device: str) -> None:
-    """Shapes, their order and their ages stay; the rows of what has rows by shape, too."""
-    scene = random_scene(Kind.FILL, count=3, basis=Basis.SPLINE, beziers=6).append(mixed_scene())
-    parameters = Parameters(scene, Backend.on(device))
-    moments, ages = with_a_past(parameters), 10 + np.arange(len(scene))
-    keep = np.delete(np.arange(len(scene.points)), [1, 4, 13])
-    mask = np.isin(np.arange(len(scene.points)), keep)
-    parameters.reshape(replace(scene, points=scene.points + 1).without_points(mask), keep)
-    points = scene.points[keep] + 1
-    after = parameters.scene()
-    assert after.point_counts()[:4].tolist() == [4, 6, 5, 12]
-    np.testing.assert_array_equal(after.points, points)
-    np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), ages)
-    for attribute in ATTRIBUTES:
-        group = parameters.groups[attribute.name]
-        rows = keep if attribute.per == "point" else np.arange(len(moments[attribute.name][0]))
-        for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
-            np.testing.assert_array_equal(moment.numpy(), old[rows])
     assert parameters.revision == 1

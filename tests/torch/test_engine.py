@@ -16,7 +16,6 @@ from warpsplat.errors import UsageError
 from warpsplat.rendering import kernel_cache
 from warpsplat.scene import Cap, Join, Kind, Scene
 from warpsplat.torch import SceneTensors, clear_cache, kept, passes, render
-from warpsplat.torch.engine import Engine
 
 
 def step(scene: Scene, width: int = 40) -> torch.Tensor:
@@ -135,21 +134,6 @@ def test_a_graph_of_what_was_not_rendered_before_is_refused(capturing: Callable[
 Tensor = torch.Tensor
 
 
-@pytest.fixture
-def renders(monkeypatch: pytest.MonkeyPatch) -> list[Engine]:
-    """Start without renderers; the one of each forward pass is added to the list."""
-    clear_cache()
-    done: list[Engine] = []
-    own = Engine.forward
-
-    def counted(engine: Engine, values: dict[str, Tensor]) -> None:
-        done.append(engine)
-        own(engine, values)
-
-    monkeypatch.setattr(Engine, "forward", counted)
-    return done
-
-
 def shifted(count: int) -> list[Scene]:
     """Return scenes of one structure."""
     scene = random_scene(Kind.FILL, 5)
@@ -185,18 +169,6 @@ def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[Tensor]:
 def test_bits_are_those_of_single_calls(scenes: list[Scene], threads: int) -> None:
     for one, other in zip(found(scenes, threads, at_once=True), found(scenes, 1, at_once=False), strict=True):
         assert torch.equal(one, other)
-
-
-def test_without_memory_images_are_rendered_again(
-    renders: list[Engine], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    wanted = found(shifted(4), 1, at_once=True)
-    clear_cache()
-    renders.clear()
-    monkeypatch.setattr(kept, "_limit", lambda device: 1)
-    assert all(map(torch.equal, found(shifted(4), 1, at_once=True), wanted))
-    assert len(set(renders)) == 1
-    assert len(renders) == 4 + 3  # the last image is still there
 
 
 @pytest.mark.parametrize("threads", [1, 3])

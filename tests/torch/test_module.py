@@ -12,7 +12,7 @@ import torch
 
 import warpsplat
 from tests.fit.pictures import picture
-from tests.scenes import disc, mixed_scene, random_scene, with_gradients
+from tests.scenes import disc, random_scene, with_gradients
 from warpsplat import CustomLoss
 from warpsplat.errors import UsageError
 from warpsplat.fit.custom_loss import evaluate
@@ -23,8 +23,6 @@ from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.torch import Module, SceneTensors, over, render
 
-NAMES = {"points", "colors", "opacities"}
-
 
 def twins() -> Scene:
     """Return a path that is filled and stroked."""
@@ -32,22 +30,6 @@ def twins() -> Scene:
     kind, widths = np.array([Kind.STROKE], np.int32), np.full(1, 2, np.float32)
     stroke = replace(fill, kind=kind, widths=widths, colors=1 - fill.colors)
     return replace(fill.append(stroke), twin=np.array([0, 1], np.int32))
-
-
-@pytest.mark.parametrize(
-    ("scene", "renderer", "more"),
-    [
-        (random_scene(Kind.FILL), "exact", set()),
-        (random_scene(Kind.STROKE), "gaussian", {"widths", "fades"}),
-        (
-            with_gradients(mixed_scene()),
-            "exact",
-            {"widths", "frames", "stop_offsets", "stop_colors", "stop_opacities"},
-        ),
-    ],
-)
-def test_parameters_are_what_some_shape_has(scene: Scene, renderer: str, more: set[str]) -> None:
-    assert {name for name, _ in Module(scene, renderer=renderer).named_parameters()} == NAMES | more
 
 
 def test_rates_are_those_of_a_run() -> None:

@@ -130,12 +130,6 @@ def test_several_threads_find_what_one_finds(threads: int) -> None:
                 assert_equal(gradient, want)
 
 
-def test_a_scene_is_drawn_as_its_tensors_are() -> None:
-    scene = random_scene(FILL)
-    assert_equal(render(scene), render(SceneTensors.of(scene)))
-    assert_equal(render([scene, moved(scene, 1.0)])[0], render(scene))
-
-
 def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tensors, "_warn_of_float64", functools.cache(tensors._warn_of_float64.__wrapped__))
     scene = moved(random_scene(FILL), 0.0)

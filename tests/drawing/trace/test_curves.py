@@ -13,7 +13,7 @@ from warpsplat.drawing.trace.curves import Pieces, areas_of, fit_circles, fit_po
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, components
 from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.partition import find_partition
-from warpsplat.drawing.trace.planar import STEPS, find_loops
+from warpsplat.drawing.trace.planar import find_loops
 from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.regions import find_regions
 from warpsplat.drawing.trace.spans import Polyline
@@ -146,19 +146,6 @@ def test_many_at_once_are_as_each_alone() -> None:
     first[7] = second[7] = 0
     alone = [handles_through(a, b) for a, b in zip(first, second, strict=True)]
     np.testing.assert_allclose(handles_through(first, second), alone, atol=1e-9)
-
-
-def test_each_crack_ends_where_the_next_begins() -> None:
-    labels, _ = components(
-        np.random.default_rng(0).integers(0, 3, (20, 20)).astype(np.int32), np.zeros((20, 20, 4))
-    )
-    loops = find_loops(labels, np.zeros((20, 20, 4), np.float32))
-    for i in range(len(loops)):
-        part = slice(loops.first[i], loops.first[i + 1])
-        ends = loops.vertices[part] + STEPS[loops.directions[part]]
-        assert (ends == np.roll(loops.vertices[part], -1, axis=0)).all()
-    outer = loops.region[~loops.is_hole]
-    assert sorted(outer.tolist()) == list(range(labels.max() + 1)), "each region has one loop around it"
 
 
 @pytest.mark.parametrize("dark", [True, False])

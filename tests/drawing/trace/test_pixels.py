@@ -149,14 +149,6 @@ def test_what_is_empty_stays_empty() -> None:
     assert score_svg(write_svg(scene, per_pixel=per_pixel), image, perceptual=False).psnr == np.inf
 
 
-def test_a_background_of_its_own_needs_no_path() -> None:
-    image = noise(8, 3)
-    scene, _ = trace_pixels(image, np.asarray(image[0, 0]))
-    assert len(scene) == 2
-    scene, _ = trace_pixels(image, np.array([0.1, 0.2, 0.3], np.float32))
-    assert len(scene) == 3
-
-
 def test_a_photograph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pixels, "MOST_CELLS", 100)
     with pytest.raises(ImageError, match="16x16 cells, more than pixel art may have"):

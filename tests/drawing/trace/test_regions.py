@@ -12,7 +12,7 @@ from warpsplat.drawing.trace.grids import NO_REGION, components
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.nesting import find_nesting
 from warpsplat.drawing.trace.palette import Coloring
-from warpsplat.drawing.trace.partition import Partition, find_partition
+from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions, find_regions
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.rendering.renderer import render
@@ -122,30 +122,10 @@ def letters() -> FloatArray:
     return draw_exactly(ground("#ffffff", 36, 16) + LETTERS, 36, 16)
 
 
-@pytest.fixture(scope="module")
-def small(letters: FloatArray) -> Partition:
-    return find_partition(find_regions(levels(letters)))
-
-
-def test_letters_have_one_ink_their_counters_and_their_dots(small: Partition) -> None:
-    assert len(np.unique(small.paint)) == 2
-    # The paper, two counters; two rings, two stems with a dot each, and the "l".
-    assert len(small.paint) == 1 + 2 + 2 + 4 + 1
-
-
 def test_a_trace_of_small_letters_is_near_their_source_at_four_times_the_size(letters: FloatArray) -> None:
     large = draw_exactly(f'<g transform="scale(4)">{ground("#ffffff", 36, 16)}{LETTERS}</g>', 144, 64)
     shown = render(trace(letters).scene, scale=4)
     assert decibels(shown, large) > 23
-
-
-def test_tips_are_no_parts_of_their_own() -> None:
-    points = (180, 40), (196, 84), (240, 88), (206, 116), (218, 160), (180, 136), (142, 160), (154, 116)
-    star = "".join(f"L{x / 4.1:.2f} {y / 4.1:.2f}" for x, y in points).replace("L", "M", 1)
-    image = draw_exactly(ground("#ffffff", 64, 44) + f'<path d="{star}z" fill="#143cb4"/>', 64, 44)
-    found = find_partition(find_regions(levels(image)))
-    assert found.scale > 1
-    assert len(found.paint) == 2
 
 
 @pytest.mark.parametrize("seed", range(24))
