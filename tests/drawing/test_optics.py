@@ -43,15 +43,9 @@ def small(how: Image.Resampling, times: int = 1) -> Image.Image:
     return enlarged(BIG).resize((times * SIDE, times * SIDE), how)
 
 
-def light(times: int = 1) -> FloatArray:
-    """The drawing in linear light [levels]."""
-    step = BIG // times
-    parts = LINEAR[np.asarray(enlarged(BIG))].reshape(times * SIDE, step, times * SIDE, step, 3)
-    return np.asarray(parts.mean(axis=(1, 3)), np.float32)
-
-
 def in_linear_light() -> Image.Image:
-    return Image.fromarray(np.searchsorted(MIDDLES, light()).astype(np.uint8))
+    light = LINEAR[np.asarray(enlarged(BIG))].reshape(SIDE, BIG, SIDE, BIG, 3).mean(axis=(1, 3))
+    return Image.fromarray(np.searchsorted(MIDDLES, light.astype(np.float32)).astype(np.uint8))
 
 
 BOX = Image.Resampling.BOX
@@ -79,19 +73,6 @@ def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
 
-def untouched(image: FloatArray, over: Callable[[], bool] = lambda: False) -> tuple[FloatArray, int]:
-    """An image without its optics, and how often it was traced."""
-    times = 0
-
-    def traced(each: FloatArray) -> Traced:
-        nonlocal times
-        times += 1
-        return trace(each)
-
-    result, _ = without_optics(image, None, traced, show, over)
-    return result, times
-
-
 def test_means_and_steps_of_pixels_tell_nothing() -> None:
     """Any kernel that sharpens would explain steps."""
     found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))
@@ -105,9 +86,14 @@ def test_means_and_steps_of_pixels_tell_nothing() -> None:
 def test_an_image_that_is_as_it_was_drawn_stays_and_so_do_all_without_time(
     how: str | None, is_late: bool
 ) -> None:
-    image = pixels(MADE[how]() if how else small(BOX))
-    result, times = untouched(image, lambda: is_late)
-    assert result is image and times == 1
+    image, traced = pixels(MADE[how]() if how else small(BOX)), list[Traced]()
+
+    def once(each: FloatArray) -> Traced:
+        traced.append(trace(each))
+        return traced[-1]
+
+    result, _ = without_optics(image, None, once, show, lambda: is_late)
+    assert result is image and len(traced) == 1
 
 
 @pytest.mark.parametrize("how", MADE)
@@ -144,14 +130,16 @@ def test_outlines_are_no_rings() -> None:
     np.testing.assert_array_equal(found.plain, image)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 3), (3, 2)])
-@pytest.mark.parametrize("planes", [3, 4])
-def test_small_images_have_no_edges(shape: tuple[int, int], planes: int) -> None:
-    image = np.zeros((*shape, planes), np.float32)
-    image[-1:, -1:] = 200
-    found = find_edges(image)
-    np.testing.assert_array_equal(found.plain, image)
-    assert not found.has_rings and not found.is_linear
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 3), (3, 2), (1, 40), (3, 50)])
+def test_small_images_have_no_edges_and_were_not_enlarged(shape: tuple[int, int]) -> None:
+    for planes in (3, 4):
+        image = np.zeros((*shape, planes), np.float32)
+        image[-1:, -1:] = 200
+        found = find_edges(image)
+        np.testing.assert_array_equal(found.plain, image)
+        assert not found.has_rings and not found.is_linear
+    before = before_enlarging(np.full((*shape, 3), 90, np.float32))
+    assert before is None or (before == 90).all()
 
 
 def floats(image: Image.Image) -> FloatArray:
@@ -170,23 +158,17 @@ def test_any_factor_is_found(size: tuple[int, int], by: str) -> None:
     assert np.abs(found - floats(was)).mean() < 0.5
 
 
-@pytest.mark.parametrize(
-    "how", [Image.Resampling.BICUBIC, Image.Resampling.LANCZOS, Image.Resampling.NEAREST]
-)
-def test_other_ways_to_enlarge_leave_an_image_as_it_is(how: Image.Resampling) -> None:
-    assert before_enlarging(floats(small(BOX).resize((150, 150), how))) is None
-
-
-def test_what_was_not_enlarged_or_is_smooth_stays() -> None:
-    for image in (small(BOX), enlarged(2), small(BOX).filter(ImageFilter.GaussianBlur(2.5))):
-        assert before_enlarging(floats(image)) is None
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (2, 2), (3, 50)])
-def test_small_and_flat_images_stay(shape: tuple[int, int]) -> None:
-    image = np.full((*shape, 3), 90, np.float32)
-    found = before_enlarging(image)
-    assert found is None or (found == 90).all()
+def test_what_was_not_enlarged_or_otherwise_stays() -> None:
+    """Nor does what is smooth, or has edges along the axes only: a mixed pixel between flat ones lies alone
+    between two of nearly any smaller image."""
+    others = (Image.Resampling.BICUBIC, Image.Resampling.LANCZOS, Image.Resampling.NEAREST)
+    images = [*(small(BOX).resize((150, 150), how) for how in others), small(BOX), enlarged(2)]
+    images.append(small(BOX).filter(ImageFilter.GaussianBlur(2.5)))
+    box = np.full((90, 120, 3), 250, np.float32)
+    box[20:70, 30:80] = (40, 90, 160)
+    box[20:70, 29], box[20:70, 80], box[19, 30:80], box[70, 30:80] = 180, 100, 230, 130
+    for image in (*map(floats, images), box):
+        assert before_enlarging(image) is None
 
 
 def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
@@ -202,15 +184,8 @@ def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
     assert made.optics and made.optics.psnr > made.score.psnr  # type: ignore[union-attr]
 
 
-def test_edges_along_the_axes_are_no_sign_of_enlargement() -> None:
-    """A mixed pixel between flat ones lies alone between two of nearly any smaller image."""
-    image = np.full((90, 120, 3), 250, np.float32)
-    image[20:70, 30:80] = (40, 90, 160)
-    image[20:70, 29], image[20:70, 80], image[19, 30:80], image[70, 30:80] = 180, 100, 230, 130
-    assert before_enlarging(image) is None
-
-
 INK = (61, 31, 54)
+RAMP = '<linearGradient id="g"><stop stop-color="#fd0"/><stop offset="1" stop-color="#06c"/></linearGradient>'
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="{0}" height="{0}" viewBox="0 0 96 96">'
     '<rect width="96" height="96" fill="#fff"/><circle cx="30" cy="34" r="22" fill="#a23b72"/>'
@@ -218,45 +193,20 @@ SVG = (
 )
 
 
-def sharpened() -> Image.Image:
-    big = Image.fromarray(np.asarray(on_white(render_svg(SVG.format(768)))).astype(np.uint8))
-    return big.resize((96, 96), BOX).filter(ImageFilter.UnsharpMask(1, 60, 0))
-
-
-def scene() -> Scene:
-    return warpsplat.load_svg(SVG.format(96))
-
-
-@pytest.mark.parametrize("is_wrong", [True, False])
-def test_the_ink_of_thin_lines_is_what_it_was(is_wrong: bool) -> None:
-    seen, true = Seen.of(pixels(sharpened())), scene()
+@pytest.mark.parametrize(("is_wrong", "is_shaded"), [(True, False), (False, False), (False, True)])
+def test_the_ink_of_thin_lines_is_what_it_was(is_wrong: bool, is_shaded: bool) -> None:
+    """Through the optics of a sharpened picture. A gradient stays and counts."""
+    svg = SVG.replace("<rect", RAMP + "<rect").replace("#a23b72", "url(#g)") if is_shaded else SVG
+    big = Image.fromarray(np.asarray(on_white(render_svg(svg.format(768)))).astype(np.uint8))
+    made = big.resize((96, 96), BOX).filter(ImageFilter.UnsharpMask(1, 60 * (not is_shaded), 0))
+    seen, true = Seen.of(pixels(made)), warpsplat.load_svg(svg.format(96))
     kernel = seen.find(*(show(each) for each in seen.scenes(true))).kernel
     is_ink = (np.abs(255 * true.colors - INK) < 1).all(axis=1)
     wrong = np.where(is_ink[:, None] & is_wrong, np.float32([0.15, 0, 0.12]), true.colors)
     found = with_seen_colors(replace(true, colors=wrong), seen, kernel, show)
     np.testing.assert_allclose(255 * found.colors, 255 * true.colors, atol=4)
-    np.testing.assert_array_equal(found.points, true.points)
-
-
-def test_gradients_stay_and_count() -> None:
-    """What is not flat shows as it is; colours beside it are solved for."""
-    shaded = (
-        SVG.format(96)
-        .replace(
-            "<circle",
-            '<linearGradient id="g"><stop stop-color="#fd0"/><stop offset="1" stop-color="#06c"/>'
-            "</linearGradient><circle",
-            1,
-        )
-        .replace('fill="#a23b72"', 'fill="url(#g)"')
-    )
-    true = warpsplat.load_svg(shaded)
-    image = pixels(Image.fromarray(np.asarray(on_white(render_svg(shaded))).astype(np.uint8)))
-    seen = Seen.of(image)
-    kernel = seen.find(*(show(each) for each in seen.scenes(true))).kernel
-    found = with_seen_colors(true, seen, kernel, show)
     np.testing.assert_array_equal(found.stop_colors, true.stop_colors)
-    np.testing.assert_allclose(255 * found.colors, 255 * true.colors, atol=4)
+    np.testing.assert_array_equal(found.points, true.points)
 
 
 def test_many_colours_stay() -> None:
