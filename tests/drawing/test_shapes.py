@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -24,7 +23,6 @@ from tests.drawing.drawings import (
     star,
 )
 from tests.drawing.test_fit_outlines import assert_clean, psnr
-from tests.drawing.trace.test_curves import halves
 from warpsplat.drawing import prices
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
@@ -44,21 +42,15 @@ from warpsplat.svg.write import write_svg
 
 def split(made: Drawing) -> Drawing:
     """Return a drawing with each piece in two."""
-    scene, following = made.scene, 3 * made.following()
-    on = np.arange(0, len(scene.points), 3)
-    outlines: dict[int, list[Outline]] = {}
-    contours = np.searchsorted(scene.starts, on, side="right").tolist()
-    owners = np.searchsorted(scene.first, on, side="right").tolist()
-    ends = zip(on.tolist(), following.tolist(), made.lines().tolist(), contours, owners, strict=True)
-    for (owner, _), pieces in itertools.groupby(ends, lambda piece: (piece[4], piece[3])):
-        points, joints = [], []
-        for a, b, is_line, *_ in pieces:
-            first, second = halves(scene.points[[a, a + 1, a + 2, b]].astype(float), 0.5)
-            points += [*first[:3], *second[:3]]
-            inner = [Joint.LINE_HANDLE] * 2 if is_line else [Joint.FREE] * 2
-            joints += [made.joints[a], *inner, Joint.CORNER if is_line else Joint.SMOOTH, *inner]
-        outlines.setdefault(owner - 1, []).append((np.array(points), joints))
-    return drawing(scene.canvas, *((scene.colors[owner], own) for owner, own in outlines.items()))
+    a, b, c, d = made.cubics().transpose(1, 0, 2)
+    ab, bc, cd = (a + b) / 2, (b + c) / 2, (c + d) / 2
+    points = np.stack([a, ab, (ab + bc) / 2, (ab + 2 * bc + cd) / 4, (bc + cd) / 2, cd], axis=1)
+    inner = np.where(made.lines(), Joint.LINE_HANDLE, Joint.FREE)
+    middle = np.where(made.lines(), Joint.CORNER, Joint.SMOOTH)
+    joints = np.stack([made.joints[::3], inner, inner, middle, inner, inner], axis=1)
+    both = {"first": 2 * made.scene.first, "starts": 2 * made.scene.starts}
+    scene = replace(made.scene, points=points.reshape(-1, 2).astype(np.float32), **both)
+    return Drawing(scene, joints.ravel().astype(np.int32))
 
 
 def nodes(made: Drawing) -> int:
@@ -115,13 +107,6 @@ def found(made: Drawing, noise: float = 0.0) -> list[Primitive]:
     return [one for _, one in primitives(done, done.points.astype(np.float64))]
 
 
-def flat(x: float, y: float, radius: float) -> Outline:
-    """A disc that is a tenth lower below than above."""
-    points, _ = disc(0, 0, radius)
-    points[:, 1] *= np.where(points[:, 1] < 0, 1, 0.9)
-    return points + (x, y), ROUND * 4
-
-
 @pytest.mark.parametrize("noise", [0, 6])
 def test_what_is_nearly_a_shape_becomes_one(noise: float) -> None:
     """Its size is that of the image's, and equal sizes are equal; so are the rings of a compound path."""
@@ -144,8 +129,10 @@ def test_what_is_nearly_a_shape_becomes_one(noise: float) -> None:
 
 def test_what_an_image_shows_otherwise_stays() -> None:
     """A disc that is flat below, and a square with one corner cut off."""
+    flat, joints = disc(0, 0, 14)
+    flat[:, 1] *= np.where(flat[:, 1] < 0, 1, 0.9)
     cut = polygon((44, 6), (64, 6), (64, 22), (60, 26), (44, 26))
-    assert not found(drawing(SHEET, (RED, [flat(20, 20, 14)]), (BLUE, [cut])))
+    assert not found(drawing(SHEET, (RED, [(flat + 20, joints)]), (BLUE, [cut])))
 
 
 def test_equal_outlines_of_a_noisy_image_are_equal() -> None:
@@ -171,14 +158,12 @@ def written(made: Drawing, **options: bool) -> int:
     return len(write_svg(made.scene, per_pixel=10, **options))
 
 
-def ring(corners: int, seed: int, *, bent: bool = False, size: float = 50.0) -> Outline:
+def ring(corners: int, seed: int, *, bent: bool = False) -> Outline:
     """A closed outline of lines, or of cubics, around somewhere."""
     rng = np.random.default_rng(seed)
     around = np.sort(rng.random(corners)) * 2 * np.pi
-    ends = rng.uniform(60, 340, 2) + size * rng.uniform(0.5, 1, (corners, 1)) * np.stack(
-        [np.cos(around), np.sin(around)], 1
-    )
-    points, joints = polygon(*ends)
+    away = 50 * rng.uniform(0.5, 1, (corners, 1)) * np.stack([np.cos(around), np.sin(around)], axis=1)
+    points, joints = polygon(*(rng.uniform(60, 340, 2) + away))
     if bent:
         points = points + np.where(np.arange(3 * corners)[:, None] % 3, rng.normal(0, 5, points.shape), 0)
         joints = [Joint.CORNER, Joint.FREE, Joint.FREE] * corners
@@ -195,15 +180,10 @@ def each(more: Drawing, fewer: Drawing, count: int = COUNT) -> float:
 
 def test_a_node_takes_what_it_costs() -> None:
     """A cubic, a line, and the handles between the two, of the size that they have in logos."""
-    lines, cubics = (
-        each(of_rings(9), of_rings(6), 3 * COUNT),
-        each(of_rings(9, bent=True), of_rings(6, bent=True), 3 * COUNT),
-    )
-    assert lines == pytest.approx(prices.LINE, rel=0.15)
-    assert cubics == pytest.approx(prices.CUBIC, rel=0.15)
-    assert (written(of_rings(6, bent=True)) - written(of_rings(6))) / (6 * COUNT) == pytest.approx(
-        prices.HANDLES, rel=0.25
-    )
+    few, many, bent, more_bent = of_rings(6), of_rings(9), of_rings(6, bent=True), of_rings(9, bent=True)
+    assert each(many, few, 3 * COUNT) == pytest.approx(prices.LINE, rel=0.15)
+    assert each(more_bent, bent, 3 * COUNT) == pytest.approx(prices.CUBIC, rel=0.15)
+    assert each(bent, few, 6 * COUNT) == pytest.approx(prices.HANDLES, rel=0.25)
 
 
 def test_a_region_takes_what_it_costs() -> None:
