@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,45 +29,63 @@ TILES_X, TILE_COUNT = 3, 6
 
 
 class Launched:
-    """Gradient and sums of the kernel, for an image that ends inside a tile."""
+    """Gradient and sums of kernels, for an image that ends inside a tile.
+
+    What lies in the padding of the tiles must not count, nor must weights that nobody gave.
+    """
 
     def __init__(
         self,
+        kernels: Sequence[wp.Kernel],
         a: FloatArray,
         b: FloatArray,
         backend: Backend,
         *,
-        phase: int = 0,
-        similarity_weight: float = 0.0,
         weights: FloatArray | None = None,
+        before: float = 5,
+        **values: Any,
     ) -> None:
-        outside = 9 * (to_tiles(np.ones_like(a)) == 0).astype(np.float32)
-        # What lies in the padding of the tiles must not count.
-        # Nor must weights that nobody gave.
+        planes, lanes = a.shape[2], backend.lanes
+        is_outside = to_tiles(np.ones_like(a)) == 0
         given = np.full(SHAPE[:2], 7, np.float32) if weights is None else weights
-        values: dict[str, Any] = {
-            "image": backend.columns_of(to_tiles(a) + outside),
-            "target": backend.columns_of(to_tiles(b)),
-            "importance": backend.columns_of(to_tiles(given[..., None])[:, 0]),
-            "weighted": weights is not None,
-            "tile_cache": wp.zeros(TILE_COUNT, dtype=int, device=backend.device),
-            "width": WIDTH,
-            "height": HEIGHT,
-            "tiles_x": TILES_X,
-            "clock": wp.array([4 + phase], dtype=int, device=backend.device),
-            "similarity_weight": similarity_weight,
-            "value_count": a.size,
-            "image_grad": backend.columns_of(np.full_like(outside, 5)),
-            "loss": wp.zeros((TILE_COUNT, 3, backend.lanes), dtype=float, device=backend.device),
-            "similarity": wp.zeros((TILE_COUNT, 3, backend.lanes), dtype=float, device=backend.device),
+        gradient = backend.columns_of(np.full(is_outside.shape, before, np.float32))
+        sums = {
+            name: backend.array(float, TILE_COUNT, planes, lanes) for name in ("loss", "similarity", "edges")
         }
-        kernel = kernels.image_loss if backend.lanes == 1 else window_loss
-        run(kernel, (TILE_COUNT, 3, backend.lanes), str(backend.device), values)
-        tiles = read_tiles(values["image_grad"])
-        self.gradient = from_tiles(tiles, WIDTH, HEIGHT)
-        self.padding = tiles[to_tiles(np.ones_like(a)) == 0]
-        sums = (values[name].numpy().sum(dtype=np.float64) for name in ("loss", "similarity"))
-        self.loss, self.similarity = sums
+        arrays = {
+            "image": backend.columns_of(to_tiles(a) + 9 * is_outside.astype(np.float32)),
+            "target": backend.columns_of(to_tiles(b)),
+            "inside": backend.columns_of(to_tiles(np.ones_like(a))[:, 0]),
+            "importance": backend.columns_of(to_tiles(given[..., None])[:, 0]),
+            "tile_cache": backend.array(wp.int32, TILE_COUNT),
+            "image_grad": gradient,
+            **{name: backend.array(backend.column, *gradient.shape) for name in ("across_grad", "down_grad")},
+        }
+        numbers = {"width": WIDTH, "height": HEIGHT, "tiles_x": TILES_X, "tile_count": TILE_COUNT}
+        numbers |= {"value_count": 3 * WIDTH * HEIGHT, "lane_columns": backend.lane_columns}
+        for kernel in kernels:
+            dim = (TILE_COUNT, lanes) if "alpha" in kernel.key else (TILE_COUNT, planes, lanes)
+            run(kernel, dim, str(backend.device), {**arrays, **sums, **numbers, **values})
+        tiles = read_tiles(gradient)
+        self.gradient, self.padding = from_tiles(tiles, WIDTH, HEIGHT), tiles[is_outside]
+        self.loss, self.similarity, self.edges = (
+            each.numpy().sum(dtype=np.float64) for each in sums.values()
+        )
+
+
+def image_loss(
+    a: FloatArray,
+    b: FloatArray,
+    backend: Backend,
+    weights: FloatArray | None,
+    *,
+    phase: int = 0,
+    similarity_weight: float = 0.0,
+) -> Launched:
+    clock = wp.array([4 + phase], dtype=int, device=backend.device)
+    more = {"clock": clock, "weighted": weights is not None, "similarity_weight": similarity_weight}
+    kernel = kernels.image_loss if backend.lanes == 1 else window_loss
+    return Launched([kernel], a, b, backend, weights=weights, **more)
 
 
 @pytest.fixture(params=[1, 64])
@@ -74,10 +93,10 @@ def backend(device: str, request: pytest.FixtureRequest) -> Backend:
     return replace(Backend.on(device), lanes=request.param)
 
 
-def images(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def images(seed: int, planes: int = 3) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Image, target, weights of mean 1."""
     rng = np.random.default_rng(seed)
-    a, b = (rng.uniform(size=SHAPE).astype(np.float32) for _ in range(2))
+    a, b = (rng.uniform(size=(HEIGHT, WIDTH, planes)).astype(np.float32) for _ in range(2))
     weights = rng.uniform(0.1, 3, SHAPE[:2])
     return a, b, (weights / weights.mean()).astype(np.float32)
 
@@ -85,7 +104,7 @@ def images(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 @pytest.mark.parametrize("weighted", [False, True])
 def test_squared_error(backend: Backend, weighted: bool) -> None:
     a, b, weights = images(3)
-    got = Launched(a, b, backend, weights=weights if weighted else None)
+    got = image_loss(a, b, backend, weights if weighted else None)
     x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
     squares = (x - torch.tensor(b, dtype=torch.float64)) ** 2
     w = torch.tensor(weights if weighted else np.ones_like(weights), dtype=torch.float64)[..., None]
@@ -114,8 +133,8 @@ def test_ssim(backend: Backend, phase: int, weighted: bool) -> None:
                 total = total + w[y0:y1, x0:x1].sum() * losses.ssim(u, v).sum()
     (-0.3 * total / a.size).backward()
     given = weights if weighted else None
-    got = Launched(a, b, backend, phase=phase, similarity_weight=0.3, weights=given)
-    plain = Launched(a, b, backend, phase=phase, weights=given)
+    got = image_loss(a, b, backend, given, phase=phase, similarity_weight=0.3)
+    plain = image_loss(a, b, backend, given, phase=phase)
     assert got.similarity == pytest.approx(float(total.detach()), abs=2e-7 * a.size), "rounding of the mean"
     assert x.grad is not None
     assert relative_error(got.gradient - plain.gradient, x.grad.numpy()) < 1e-4
@@ -124,44 +143,30 @@ def test_ssim(backend: Backend, phase: int, weighted: bool) -> None:
 
 def test_weights_of_one_change_nothing(backend: Backend) -> None:
     a, b, weights = images(5)
-    plain = Launched(a, b, backend, phase=3, similarity_weight=0.3)
-    ones = Launched(a, b, backend, phase=3, similarity_weight=0.3, weights=np.ones_like(weights))
+    plain, ones = (
+        image_loss(a, b, backend, given, phase=3, similarity_weight=0.3)
+        for given in (None, np.ones_like(weights))
+    )
     np.testing.assert_array_equal(plain.gradient, ones.gradient)
     assert (plain.loss, plain.similarity) == (ones.loss, ones.similarity)
 
 
-@pytest.mark.parametrize("lanes", [1, 64])
-def test_loss_and_gradient_on_black_and_on_white(device: str, lanes: int) -> None:
-    backend = replace(Backend.on(device), lanes=lanes)
-    rng = np.random.default_rng(0)
-    height, width = 20, 37
-    image, target = rng.uniform(0, 1, (2, height, width, 4)).astype(np.float32)
-    weights = rng.uniform(0.5, 2, (height, width, 1)).astype(np.float32)
-    arrays = {
-        name: backend.columns_of(to_tiles(value))
-        for name, value in (("image", image), ("target", target), ("image_grad", 0 * image))
-    }
-    arrays["importance"] = backend.columns_of(to_tiles(weights)[:, 0])
-    tiles = arrays["image"].shape[0]
-    arrays["tile_cache"] = wp.zeros(tiles, dtype=int, device=device)
-    arrays["loss"] = wp.zeros((tiles, 3, lanes), dtype=float, device=device)
-    numbers = {"lane_columns": backend.lane_columns, "value_count": 3 * height * width}
-    run(make_alpha_loss(backend.column), (tiles, lanes), device, arrays, numbers)
-
-    u = torch.tensor(image, dtype=torch.float64, requires_grad=True)
-    v, w = (torch.tensor(x, dtype=torch.float64) for x in (target, weights))
+def test_loss_and_gradient_on_black_and_on_white(backend: Backend) -> None:
+    a, b, weights = images(0, 4)
+    got = Launched([make_alpha_loss(backend.column)], a, b, backend, weights=weights)
+    u = torch.tensor(a, dtype=torch.float64, requires_grad=True)
+    v, w = torch.tensor(b, dtype=torch.float64), torch.tensor(weights, dtype=torch.float64)[..., None]
 
     def error(paper: float) -> torch.Tensor:
-        a, b = (x[..., :3] + paper * (1 - x[..., 3:]) for x in (u, v))
-        return (a - b) ** 2
+        on_paper = (x[..., :3] + paper * (1 - x[..., 3:]) for x in (u, v))
+        return (next(on_paper) - next(on_paper)) ** 2
 
     both = (error(0) + error(1)) / 2
     (w * both).mean().backward()
     assert u.grad is not None
-    got = from_tiles(arrays["image_grad"].numpy(), width, height)
-    np.testing.assert_allclose(got, u.grad.numpy(), atol=1e-6 * float(u.grad.abs().max()) + 1e-9)
-    assert np.isclose(arrays["loss"].numpy().sum(), both.sum().item(), rtol=1e-5)
-    np.testing.assert_allclose(squares(image - target), both.sum(-1).detach(), rtol=1e-5)
+    np.testing.assert_allclose(got.gradient, u.grad.numpy(), atol=1e-6 * float(u.grad.abs().max()) + 1e-9)
+    assert np.isclose(got.loss, both.sum().item(), rtol=1e-5)
+    np.testing.assert_allclose(squares(a - b), both.sum(-1).detach(), rtol=1e-5)
 
 
 def test_pictures_on_paper() -> None:
@@ -187,45 +192,18 @@ def reference(errors: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
     return (weights * slopes**2).sum() / (3 * WIDTH * HEIGHT)
 
 
-@pytest.mark.parametrize("lanes", [1, 64])
 @pytest.mark.parametrize("planes", [3, 4])
-def test_value_and_gradient(device: str, lanes: int, planes: int) -> None:
-    """Against torch in float64, on an image that ends inside a tile; that against central differences."""
-    backend = replace(Backend.on(device), lanes=lanes)
-    rng = np.random.default_rng(planes)
-    a, b = (rng.uniform(size=(HEIGHT, WIDTH, planes)).astype(np.float32) for _ in range(2))
-    weights = rng.uniform(0.1, 3, (HEIGHT, WIDTH)).astype(np.float32)
-    outside = 9 * (to_tiles(np.ones_like(a)) == 0).astype(np.float32)
-    gradient = backend.columns_of(np.full_like(outside, BEFORE))
-    sums = backend.array(float, TILE_COUNT, planes, lanes)
-    values: dict[str, Any] = {
-        "lane_columns": backend.lane_columns,
-        "image": backend.columns_of(to_tiles(a) + outside),
-        "target": backend.columns_of(to_tiles(b)),
-        "inside": backend.columns_of(to_tiles(np.ones_like(a))[:, 0]),
-        "importance": backend.columns_of(to_tiles(weights[..., None])[:, 0]),
-        "tiles_x": TILES_X,
-        "tile_count": TILE_COUNT,
-        "value_count": 3 * WIDTH * HEIGHT,
-        "edge_weight": 0.7,
-        "image_grad": gradient,
-        "edges": sums,
-    }
-    slopes = {name: backend.array(backend.column, *gradient.shape) for name in ("across_grad", "down_grad")}
-    for kernel in (make_edge_slopes(backend.column), make_edge_backward(backend.column)):
-        names = [argument.label for argument in kernel.adj.args[1:]]
-        used = {name: value for name, value in {**values, **slopes}.items() if name in names}
-        run(kernel, (TILE_COUNT, planes, lanes), str(backend.device), used)
+def test_edges(backend: Backend, planes: int) -> None:
+    """Against torch in float64, and that against central differences."""
+    a, b, weights = images(planes, planes)
+    both = make_edge_slopes(backend.column), make_edge_backward(backend.column)
+    got = Launched(both, a, b, backend, weights=weights, before=BEFORE, edge_weight=0.7)
     x = torch.tensor(a, dtype=torch.float64, requires_grad=True)
     w, y = torch.tensor(weights, dtype=torch.float64), torch.tensor(b, dtype=torch.float64)
     loss = 0.7 * reference(x - y, w)
     loss.backward()
     assert torch.autograd.gradcheck(lambda image: reference(image - y, w), x)
-    total = sums.numpy().sum(dtype=np.float64) / (3 * WIDTH * HEIGHT)
-    assert total == pytest.approx(float(loss.detach()), rel=1e-5)
+    assert got.edges / (3 * WIDTH * HEIGHT) == pytest.approx(float(loss.detach()), rel=1e-5)
     assert x.grad is not None
-    got = read_tiles(gradient)
-    assert relative_error(from_tiles(got, WIDTH, HEIGHT) - BEFORE, x.grad.numpy()) < 1e-4, (
-        "added to what is there"
-    )
-    assert (got[outside > 0] == BEFORE).all()
+    assert relative_error(got.gradient - BEFORE, x.grad.numpy()) < 1e-4, "added to what is there"
+    assert (got.padding == BEFORE).all()
