@@ -10,9 +10,6 @@ from warpsplat.kernels.elementary import angle_of, power, sine_and_cosine
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
-TILE = wp.constant(constants.TILE)
-PARTIAL = wp.constant(constants.PARTIAL)
-
 
 @functools.cache
 def make_blue_backward(column: Any) -> wp.Kernel:

@@ -42,19 +42,6 @@ def test_shapes_have_whole_curves(basis: Basis, kind: Kind, counts: tuple[int, .
     assert scene.bezier_counts().tolist() == 2 * [5 if kind == Kind.FILL else 3]
 
 
-def test_uniform_leaves_the_rest_at_0() -> None:
-    points = np.arange(48, dtype=np.float32).reshape(2, 12, 2)
-    scene = Scene.uniform(Kind.FILL, canvas(9, 9), points, opacities=np.array([0.5, 0.7], np.float32))
-    assert scene.first.tolist() == [0, 12, 24]
-    assert set(scene.basis) == {Basis.CUBIC} and scene.bezier_counts().tolist() == [4, 4]
-    np.testing.assert_array_equal(scene.points_of(1), points[1])
-    np.testing.assert_array_equal(scene.opacities, np.float32([0.5, 0.7]))
-    assert not scene.colors.any()
-    assert not scene.widths.any()
-    with pytest.raises(TypeError, match="colours"):
-        Scene.uniform(Kind.FILL, canvas(9, 9), points, colours=np.zeros((2, 3), np.float32))
-
-
 def test_take_and_append() -> None:
     """Shapes of different lengths keep their rows, in any order, even twice."""
     scene = mixed_scene(seed=1)
