@@ -140,16 +140,7 @@ ODD: dict[str, list[Outline]] = {
     "mixed": [*MIXED_CUBICS, (Kind.FILL, CUBIC, 1), (Kind.STROKE, CUBIC, 4), (Kind.FILL, CUBIC, 3)],
     "splined fills": [(Kind.FILL, SPLINE, n) for n in (5, 3, 12, 4, 8)],
     "splined strokes": [(Kind.STROKE, SPLINE, n) for n in (4, 1, 9, 2, 3)],
-    "both bases": [
-        (kind, basis, n)
-        for n in (3, 4)
-        for kind, basis in (
-            (Kind.STROKE, SPLINE),
-            (Kind.FILL, CUBIC),
-            (Kind.FILL, SPLINE),
-            (Kind.STROKE, CUBIC),
-        )
-    ],
+    "both bases": [(kind, basis, n) for n in (3, 4) for kind in Kind for basis in CURVES],
 }
 
 

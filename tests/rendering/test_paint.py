@@ -18,51 +18,46 @@ def transparent(scene: Scene) -> Scene:
     return replace(scene, canvas=Canvas(scene.canvas.width, scene.canvas.height, None))
 
 
-@pytest.mark.parametrize("lanes", [1, 64])
-@pytest.mark.parametrize("scale", [1.0, 1.7])
-def test_gradients(device: str, lanes: int, scale: float) -> None:
-    compare(with_gradients(mixed_scene(seed=1)), device, scale, lanes=lanes)
-
-
-@pytest.mark.parametrize("lanes", [1, 64])
-def test_transparent_canvas(device: str, lanes: int) -> None:
-    compare(transparent(with_gradients(mixed_scene(seed=2))), device, lanes=lanes)
-    compare(transparent(random_scene(Kind.FILL)), device, lanes=lanes)
-
-
-@pytest.mark.parametrize("spread", Spread)
-@pytest.mark.parametrize("paint", [Paint.LINEAR, Paint.RADIAL])
-def test_spread(device: str, paint: Paint, spread: Spread) -> None:
+def spread(paint: Paint, spread: Spread) -> Scene:
     scene = with_gradients(random_scene(Kind.FILL, 3, seed=4), seed=5)
     both = {"paint": paint, "spread": spread}
-    traits = {name: np.where(scene.paint > 0, value, 0).astype(np.int32) for name, value in both.items()}
-    compare(replace(scene, **traits), device)
+    return replace(
+        scene, **{name: np.where(scene.paint > 0, v, 0).astype(np.int32) for name, v in both.items()}
+    )
 
 
-@pytest.mark.parametrize("lanes", [1, 64])
-@pytest.mark.parametrize("clear", [False, True])
-def test_ramps(device: str, lanes: int, clear: bool) -> None:
-    """Two ascending stops, padded, from a circle's centre: the way for these is a shorter one."""
-    scene = with_stops(random_scene(Kind.FILL, 6, seed=10), seed=11)
-    compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
-
-
-@pytest.mark.parametrize("lanes", [1, 64])
-@pytest.mark.parametrize("clear", [False, True])
-@pytest.mark.parametrize("offsets", [(0.15, 0.3, 0.42, 0.5, 0.95), (0.15, 0.4, 0.4, 0.6, 0.6)])
-def test_chains_of_stops(device: str, lanes: int, clear: bool, offsets: tuple[float, ...]) -> None:
-    """Gradients whose columns reach one interval, several, or lie beyond either end; two in one place."""
-    scene = with_stops(random_scene(Kind.FILL, 6, seed=12), offsets, seed=13)
-    compare(transparent(scene) if clear else scene, device, 1.3, lanes=lanes)
-
-
-def test_stops_out_of_order(device: str) -> None:
-    """One that lies before the one before it counts as lying there, and does not move by itself."""
+def out_of_order() -> Scene:
+    """A stop that lies before the one before it counts as lying there, and does not move by itself."""
     scene = with_gradients(random_scene(Kind.FILL, 4, seed=6), seed=7)
     offsets = scene.stop_offsets.copy()
-    third = slice(int(scene.stop_first[2]), int(scene.stop_first[3]))
-    offsets[third] = [0.2, 0.7, 0.4]
-    compare(replace(scene, stop_offsets=offsets), device)
+    offsets[scene.stop_first[2] : scene.stop_first[3]] = [0.2, 0.7, 0.4]
+    return replace(scene, stop_offsets=offsets)
+
+
+def stops(*offsets: float) -> Scene:
+    return with_stops(random_scene(Kind.FILL, 6, seed=10), offsets, seed=11)
+
+
+# Two ascending stops, padded, from a circle's centre, go a shorter way. Columns of longer chains reach one
+# interval, several, or lie beyond either end; two stops may lie in one place.
+STOPS = {"ramps": (0.1, 0.8), "chains": (0.15, 0.3, 0.42, 0.5, 0.95), "steps": (0.15, 0.4, 0.4, 0.6, 0.6)}
+MIXED = with_gradients(mixed_scene(seed=1))
+SCENES: dict[str, tuple[Scene, float]] = {
+    "mixed": (MIXED, 1),
+    "mixed, enlarged": (MIXED, 1.7),
+    "mixed, transparent": (transparent(MIXED), 1),
+    "flat, transparent": (transparent(random_scene(Kind.FILL)), 1),
+    "stops out of order": (out_of_order(), 1),
+    **{f"{p.name}, {s.name}": (spread(p, s), 1) for p in (Paint.LINEAR, Paint.RADIAL) for s in Spread},
+    **{name: (stops(*offsets), 1.3) for name, offsets in STOPS.items()},
+    **{f"{name}, transparent": (transparent(stops(*offsets)), 1.3) for name, offsets in STOPS.items()},
+}
+
+
+@pytest.mark.parametrize("lanes", [1, 64])
+@pytest.mark.parametrize(("scene", "scale"), SCENES.values(), ids=SCENES.keys())
+def test_gradients(device: str, scene: Scene, scale: float, lanes: int) -> None:
+    compare(scene, device, scale, lanes=lanes)
 
 
 def test_two_stops_in_one_place_are_a_step(device: str) -> None:
