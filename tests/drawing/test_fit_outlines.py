@@ -75,7 +75,7 @@ def test_free_numbers_move_points_along_the_constraints(made: Drawing) -> None:
     np.testing.assert_allclose(freedom.times(ways[0]) @ ways[1], freedom.adjoint(ways[1]) @ ways[0])
 
 
-def test_what_is_held_stays() -> None:
+def test_held_points_stay() -> None:
     made = logo()
     every = np.arange(len(made.joints))
     held = every % 6 == 0

@@ -93,7 +93,7 @@ def within_600(size: Callable[[float], float]) -> tuple[float, list[float]]:
     return made.per_pixel, asked
 
 
-def test_the_least_price_is_taken_at_which_a_drawing_fits() -> None:
+def test_the_lowest_price_that_meets_the_size_is_found() -> None:
     size, asked = within_600(lambda price: 1000 - 150 * np.log2(price))
     assert 590 < size <= 600
     assert len(asked) <= TRIES
@@ -102,7 +102,7 @@ def test_the_least_price_is_taken_at_which_a_drawing_fits() -> None:
     assert len(asked) == TRIES
 
 
-def test_a_size_leaves_drawings_what_they_are() -> None:
+def test_a_size_limit_does_not_change_the_subject() -> None:
     image = draw(LOGO)
     settings, why, _ = choose_subject(image, make_settings(max_bytes="1KB"))
     assert settings.subject == "drawing" and why
@@ -110,7 +110,7 @@ def test_a_size_leaves_drawings_what_they_are() -> None:
     assert settings.subject == "photo" and "target-psnr" in why
 
 
-def test_it_says_how_long_it_takes(caplog: pytest.LogCaptureFixture) -> None:
+def test_long_runs_are_announced(caplog: pytest.LogCaptureFixture) -> None:
     image = Picture.of(np.random.default_rng(0).random((1500, 1500, 3), np.float32))
     with caplog.at_level(logging.WARNING):
         announce_fit(80, Settings())
@@ -140,7 +140,7 @@ def test_a_trace_ends_in_time_by_fewer_pixels(
 
 
 @pytest.mark.parametrize("budget", [1, 12, 30, 60, 120])
-def test_a_drawing_is_what_it_is_when_time_is_up(budget: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_ends_within_its_time_budget(budget: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each look at the clock takes a second; few are missed."""
     clock = itertools.count()
     monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
@@ -261,7 +261,7 @@ def regions(detail: float) -> int:
     return len(trace(dusty(), price=byte_price(make_settings(detail=detail))).scene.starts) - 1
 
 
-def test_dust_goes_first_and_nothing_else() -> None:
+def test_lower_detail_removes_specks_first() -> None:
     counts = [regions(detail) for detail in (0.0, 0.25, 0.5, 0.75, 1.0)]
     assert counts == sorted(counts)
     assert counts[0] == 2

@@ -97,7 +97,7 @@ def test_a_given_width_is_that_of_all_strokes(given: dict[str, str], pixels: flo
 
 
 @pytest.mark.parametrize("width", ["0", "thin", "2px", "-1"])
-def test_widths_that_are_none_are_refused(width: str) -> None:
+def test_bad_widths_are_refused(width: str) -> None:
     with pytest.raises(UsageError, match="a length such as"):
         make_settings(subject="line", width=width)
 
@@ -237,7 +237,7 @@ def test_a_line_of_two_pens_is_a_stroke_of_each(
         RING,
     ],
 )
-def test_a_pixel_is_no_other_pen(paths: str, is_grey: bool, device: str) -> None:
+def test_a_width_step_of_one_pixel_does_not_split_a_stroke(paths: str, is_grey: bool, device: str) -> None:
     assert len(scene_of(paths, device, is_grey=is_grey)[0]) == 1
 
 
@@ -264,7 +264,7 @@ def test_lines_become_strokes_and_areas_stay_fills(device: str) -> None:
 
 
 @pytest.mark.parametrize("paths", [WEDGE, BLUNT, BLOCK])
-def test_what_no_round_pen_draws_stays_a_fill(paths: str, device: str) -> None:
+def test_shapes_without_constant_width_stay_fills(paths: str, device: str) -> None:
     assert (strokes_of(paths, device).scene.kind == Kind.FILL).all()
 
 

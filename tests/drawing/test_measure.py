@@ -24,7 +24,7 @@ def moved(made: Drawing, offset: tuple[float, float]) -> Drawing:
 
 
 @pytest.mark.parametrize("background", [WHITE, None], ids=["opaque", "transparent"])
-def test_the_image_tells_where_outlines_are(device: str, background: FloatArray | None) -> None:
+def test_measured_places_and_errors_match_a_known_shift(device: str, background: FloatArray | None) -> None:
     """And what moving them costs: the error of the samples is that of the render."""
     exact = drawing(
         Canvas(64, 64, background),
@@ -48,7 +48,7 @@ def test_the_image_tells_where_outlines_are(device: str, background: FloatArray 
     assert total == pytest.approx(fit.error, rel=0.25)
 
 
-def test_the_gradient_is_that_of_the_render(device: str) -> None:
+def test_the_gradient_matches_finite_differences(device: str) -> None:
     """Against central differences along free numbers."""
     backend = Backend.on(device, 1)
     exact = logo()
@@ -65,7 +65,7 @@ def test_the_gradient_is_that_of_the_render(device: str) -> None:
         assert (ends[0] - ends[1]) / 4e-3 == pytest.approx(gradient @ way, rel=0.05, abs=2e-6)
 
 
-def test_the_normal_equations() -> None:
+def test_a_newton_step_matches_dense_normal_equations() -> None:
     """Against dense ones in float64."""
     made, rng = logo(), np.random.default_rng(1)
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))

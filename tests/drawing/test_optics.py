@@ -73,7 +73,7 @@ def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
 
-def test_means_and_steps_of_pixels_tell_nothing() -> None:
+def test_plain_and_unsmoothed_images_have_no_kernel() -> None:
     """Any kernel that sharpens would explain steps."""
     found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))
     np.testing.assert_allclose(found.kernel, NONE, atol=2e-3)
@@ -83,9 +83,7 @@ def test_means_and_steps_of_pixels_tell_nothing() -> None:
 
 
 @pytest.mark.parametrize(("how", "is_late"), [(None, False), ("blurred", True)])
-def test_an_image_that_is_as_it_was_drawn_stays_and_so_do_all_without_time(
-    how: str | None, is_late: bool
-) -> None:
+def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late: bool) -> None:
     image, traced = pixels(MADE[how]() if how else small(BOX)), list[Traced]()
 
     def once(each: FloatArray) -> Traced:
@@ -97,7 +95,7 @@ def test_an_image_that_is_as_it_was_drawn_stays_and_so_do_all_without_time(
 
 
 @pytest.mark.parametrize("how", MADE)
-def test_a_drawing_is_what_it_was_before(how: str) -> None:
+def test_drawings_are_nearer_to_their_source_with_optics(how: str) -> None:
     """It is nearer to the source, four times as large, than without its optics, and as small."""
     picture, source = pixels(MADE[how]()), pixels(enlarged(4))
     sharp, soft = (drawn(picture, 4, optics=optics) for optics in ("auto", "none"))
@@ -112,7 +110,7 @@ def test_a_blurred_draft_is_drawn_sharp() -> None:
 
 
 @pytest.mark.parametrize("how", [None, *MADE])
-def test_what_edges_tell(how: str | None) -> None:
+def test_ringing_and_linear_light_are_detected(how: str | None) -> None:
     found = find_edges(np.asarray(MADE[how]() if how else small(BOX), np.float32))
     assert found.clean.sum() > 300
     if how != "by Lanczos":  # which leaves several rings, the outermost of which are faint
@@ -148,7 +146,7 @@ def floats(image: Image.Image) -> FloatArray:
 
 @pytest.mark.parametrize("size", [(120, 120), (144, 144), (201, 200), (230, 230), (301, 300)])
 @pytest.mark.parametrize("by", ["Pillow", "OpenCV"])
-def test_any_factor_is_found(size: tuple[int, int], by: str) -> None:
+def test_images_enlarged_by_any_factor_are_restored(size: tuple[int, int], by: str) -> None:
     was = small(BOX)
     large = was.resize(size, Image.Resampling.BILINEAR)
     if by == "OpenCV":
@@ -158,7 +156,7 @@ def test_any_factor_is_found(size: tuple[int, int], by: str) -> None:
     assert np.abs(found - floats(was)).mean() < 0.5
 
 
-def test_what_was_not_enlarged_or_otherwise_stays() -> None:
+def test_other_images_are_not_taken_for_enlarged() -> None:
     """Nor does what is smooth, or has edges along the axes only: a mixed pixel between flat ones lies alone
     between two of nearly any smaller image."""
     others = (Image.Resampling.BICUBIC, Image.Resampling.LANCZOS, Image.Resampling.NEAREST)
@@ -194,7 +192,7 @@ SVG = (
 
 
 @pytest.mark.parametrize(("is_wrong", "is_shaded"), [(True, False), (False, False), (False, True)])
-def test_the_ink_of_thin_lines_is_what_it_was(is_wrong: bool, is_shaded: bool) -> None:
+def test_colors_of_thin_lines_are_recovered(is_wrong: bool, is_shaded: bool) -> None:
     """Through the optics of a sharpened picture. A gradient stays and counts."""
     svg = SVG.replace("<rect", RAMP + "<rect").replace("#a23b72", "url(#g)") if is_shaded else SVG
     big = Image.fromarray(np.asarray(on_white(render_svg(svg.format(768)))).astype(np.uint8))

@@ -50,7 +50,7 @@ def drawn(image: FloatArray, quality: str) -> npt.NDArray[np.uint8]:
     return np.asarray(render_svg(made.svg).convert("RGB"))
 
 
-def test_what_reaches_the_border_stays_as_it_is() -> None:
+def test_images_that_reach_the_border_are_not_cropped() -> None:
     image = image_of("thin")
     image[:, 0] = np.linspace(0, 1, 96)[:, None]
     picture = Picture.of(image)
@@ -132,7 +132,7 @@ def test_colours_are_blurred_by_subsampling_only(image: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("kind", ["jpeg", "webp"])
-def test_halved_is_what_files_do(lines: FloatArray, kind: str) -> None:
+def test_halved_matches_chroma_subsampling_of_files(lines: FloatArray, kind: str) -> None:
     levels = np.round(255 * lines)
     file = np.round(255 * as_file(lines, kind, quality=100))
     assert decibels(halved(levels) / 255, file / 255) > decibels(levels / 255, file / 255) + 6

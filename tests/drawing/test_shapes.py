@@ -80,7 +80,7 @@ def test_a_logo_loses_its_needless_nodes_unless_it_is_a_draft(device: str) -> No
     assert write_svg(replace(back, canvas=drawn.scene.canvas), per_pixel=finished.per_pixel) == text
 
 
-def test_what_is_seen_stays(device: str) -> None:
+def test_small_visible_details_stay(device: str) -> None:
     """Small notches of strong contrast are no needless nodes; and the result is clean."""
     backend = Backend.on(device, 1)
     notched = polygon((6, 6), (30, 6), (31, 9), (32, 6), (58, 6), (58, 40), (6, 40))
@@ -108,7 +108,7 @@ def found(made: Drawing, noise: float = 0.0) -> list[Primitive]:
 
 
 @pytest.mark.parametrize("noise", [0, 6])
-def test_what_is_nearly_a_shape_becomes_one(noise: float) -> None:
+def test_nearly_basic_shapes_become_basic_shapes(noise: float) -> None:
     """Its size is that of the image's, and equal sizes are equal; so are the rings of a compound path."""
     scene = drawing(
         SHEET,
@@ -127,7 +127,7 @@ def test_what_is_nearly_a_shape_becomes_one(noise: float) -> None:
     np.testing.assert_allclose([*square.low, *square.high, *square.radii], [34, 5, 54, 25, 3, 3], atol=0.3)
 
 
-def test_what_an_image_shows_otherwise_stays() -> None:
+def test_shapes_that_differ_from_basic_ones_stay() -> None:
     """A disc that is flat below, and a square with one corner cut off."""
     flat, joints = disc(0, 0, 14)
     flat[:, 1] *= np.where(flat[:, 1] < 0, 1, 0.9)
@@ -178,7 +178,7 @@ def each(more: Drawing, fewer: Drawing, count: int = COUNT) -> float:
     return (written(more) - written(fewer)) / count
 
 
-def test_a_node_takes_what_it_costs() -> None:
+def test_the_price_of_a_node_matches_its_bytes() -> None:
     """A cubic, a line, and the handles between the two, of the size that they have in logos."""
     few, many, bent, more_bent = of_rings(6), of_rings(9), of_rings(6, bent=True), of_rings(9, bent=True)
     assert each(many, few, 3 * COUNT) == pytest.approx(prices.LINE, rel=0.15)
@@ -186,7 +186,7 @@ def test_a_node_takes_what_it_costs() -> None:
     assert each(bent, few, 6 * COUNT) == pytest.approx(prices.HANDLES, rel=0.25)
 
 
-def test_a_region_takes_what_it_costs() -> None:
+def test_the_price_of_a_region_matches_its_bytes() -> None:
     """A path of four cubics, and one in a gradient."""
     rings = [ring(4, seed, bent=True) for seed in range(COUNT)]
     tones = np.random.default_rng(1).random((COUNT, 3))
@@ -211,7 +211,7 @@ def test_a_region_takes_what_it_costs() -> None:
     "outline",
     [disc(100, 100, 30), rounded(100, 100, 30, 8), polygon((70, 80), (130, 80), (130, 120), (70, 120))],
 )
-def test_a_basic_shape_takes_what_it_costs(outline: Outline) -> None:
+def test_the_price_of_a_basic_shape_matches_its_bytes(outline: Outline) -> None:
     made = drawing(LARGE, (BLUE, [outline]))
     ((_, shape),) = primitives(made.scene, 10.0 * made.scene.points.astype(np.float64))
     whole, other = shape.rounded(), ring(5, 0)
@@ -222,7 +222,7 @@ def test_a_basic_shape_takes_what_it_costs(outline: Outline) -> None:
     assert abs(taken - prices.of_primitive(whole)) <= 4
 
 
-def test_an_equal_outline_takes_what_it_costs() -> None:
+def test_the_price_of_an_equal_outline_matches_its_bytes() -> None:
     one, joints = ring(7, 0, bent=True)
     shifts = np.random.default_rng(4).integers(-40, 40, (COUNT, 2))
     made = drawing(LARGE, *((BLUE, [(np.round(one, 1) + shift, joints)]) for shift in shifts))
@@ -231,7 +231,7 @@ def test_an_equal_outline_takes_what_it_costs() -> None:
     assert taken == pytest.approx(USE, abs=3)
 
 
-def test_what_a_byte_is_worth() -> None:
+def test_the_worth_of_a_byte() -> None:
     """Half of the error for twice the bytes, at 1.8 dB; nothing less than the negligible error counts."""
     gained = 1e-3 - sum(prices.worth(1e-3 * 10 ** (-0.18 * math.log2(s / 1e3)), s) for s in range(1000, 2000))
     assert gained == pytest.approx(1e-3 * 10**-0.18, rel=0.01)

@@ -36,7 +36,7 @@ def photograph(noise: float = 2.0) -> FloatArray:
     return np.clip(image + grain, 0, 1).astype(np.float32)
 
 
-def test_what_is_cut_out_has_its_own_colours() -> None:
+def test_edge_colors_do_not_contain_the_background() -> None:
     found = without_ground(photograph(0), everywhere=True)
     edge = (found[..., 3] > 0.2) & (found[..., 3] < 1)
     straight = found[edge][:, :3] / found[edge][:, 3:]
@@ -72,7 +72,7 @@ def test_objects_in_holes_of_others() -> None:
     assert len(by_object(scene)) == 2
 
 
-def test_nothing_on_paper() -> None:
+def test_empty_paper_is_refused() -> None:
     with pytest.raises(ImageError, match="nothing but plain ground"):
         warpsplat.vectorize(np.full((40, 40, 3), 200, np.uint8), subject="silhouette")
 

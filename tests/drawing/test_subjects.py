@@ -31,7 +31,7 @@ def repeated(image: FloatArray, times: int) -> FloatArray:
     return np.repeat(np.repeat(image, times, axis=0), times, axis=1)
 
 
-def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> None:
+def test_repeated_pixels_are_reduced_before_tracing(device: str) -> None:
     """The large file shows what the small one does, without the steps of the pixels."""
     small = drawn(DRAWING, 100, 100)
     large = vectorized(repeated(small, 3), device)
@@ -57,9 +57,7 @@ def test_enlargement_leaves_a_picture_to_trace(side: int, times: int, found: int
 
 
 @pytest.mark.parametrize("given", [{"colors": 2}, {"palette": "#06c,#fc0"}])
-def test_what_is_translucent_leaves_no_opaque_paint_in_few_colours(
-    device: str, given: dict[str, object]
-) -> None:
+def test_translucent_paint_is_left_out_with_few_colors(device: str, given: dict[str, object]) -> None:
     """A soft shadow, as regions and as a ramp: what is less than half there is left out."""
     shadow = (
         '<linearGradient id="s"><stop stop-opacity=".5"/><stop offset="1" stop-opacity="0"/></linearGradient>'
@@ -119,7 +117,7 @@ def made(paint: Painting | None) -> warpsplat.Result:
     ("paint", "kinds"),
     [("flat", ()), ("linear", ("linear",)), ("radial", ("radial",)), ("auto", ("linear", "radial"))],
 )
-def test_only_the_gradients_that_are_allowed(paint: Painting, kinds: tuple[str, ...]) -> None:
+def test_only_allowed_gradients_are_used(paint: Painting, kinds: tuple[str, ...]) -> None:
     result = made(paint)
     assert not [note for note in result.notes if "paint" in note]
     assert [kind for kind in ("linear", "radial") if f"<{kind}Gradient" in result.svg] == [*kinds]

@@ -66,7 +66,7 @@ def test_a_run_that_is_stopped_has_the_shapes_asked_for(given: dict[str, Any], s
         assert len(np.unique(result.scene.colors, axis=0)) <= 4
 
 
-def test_figures_of_a_stopped_run_are_those_of_what_is_left(device: str) -> None:
+def test_figures_of_a_stopped_run_match_its_scene(device: str) -> None:
     target = picture()
     settings = make_settings(curves=CURVES, iterations=100, seed=1)
     made = fit(Problem(target, settings), Run(Backend.on(device), stop=after(LATE)), rounding=None)

@@ -75,7 +75,7 @@ def test_the_coarsest_grid_within_the_loss(
 
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("basis", CURVES)
-def test_a_run_ends_with_what_the_file_has(device: str, kind: Kind, basis: Basis) -> None:
+def test_the_final_scene_equals_the_file(device: str, kind: Kind, basis: Basis) -> None:
     settings = make_settings(kind=kind, basis=basis, curves=10, iterations=60)
     made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     held = rounded(made.scene, made.per_pixel)

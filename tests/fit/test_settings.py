@@ -23,7 +23,7 @@ def test_fingerprints_stay(given: dict[str, Any], wanted: str) -> None:
     assert make_settings(**given).fingerprint() == wanted
 
 
-def test_what_options_imply() -> None:
+def test_options_that_imply_others() -> None:
     plain = make_settings()
     splat, gaussian = make_settings(renderer="splat"), make_settings(renderer="gaussian")
     assert plain.rates["points"] == FILL_POINT_RATE > Settings().rates["points"]
@@ -68,7 +68,7 @@ def test_what_options_imply() -> None:
         ({"size": "9x9mm", "page": "a4"}, "size and page cannot be combined"),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], message: str) -> None:
+def test_refusals(given: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError) as caught:
         make_settings(**given)
     assert str(caught.value).startswith(message)

@@ -31,7 +31,7 @@ def new_scene(settings: Settings, image: FloatArray) -> Scene:
 
 @pytest.mark.parametrize("renderer", ["exact", "splat"])
 @pytest.mark.parametrize("kind", [*Kind, None], ids=["fill", "stroke", "mixed"])
-def test_a_captured_step_does_what_its_launches_do(device: str, kind: Kind | None, renderer: str) -> None:
+def test_a_captured_step_equals_single_launches(device: str, kind: Kind | None, renderer: str) -> None:
     """On a CPU a step is a graph where one thread is asked for; on a GPU always. Every loss is on."""
     target = np.random.default_rng(0).uniform(size=(48, 64, 3)).astype(np.float32)
     settings = make_settings(kind=kind, renderer=renderer, curves=10, iterations=50, xing=0.01)

@@ -66,7 +66,7 @@ def test_fills_and_strokes_of_different_lengths(device: str, lanes: int) -> None
     compare(faded(mixed_scene(splines=False)), device, 1.0, GaussianModel(0.4, 1.2), lanes)
 
 
-def test_an_opacity_beyond_its_bounds_is_only_led_back(device: str) -> None:
+def test_gradients_of_clamped_opacities_point_inwards(device: str) -> None:
     scene = random_scene(STROKE, 1, seed=2)
     over = replace(scene, fades=np.array([[1.5, 0, 0]], np.float32))
     renderer = renderer_for(over, device, model=SOFT)
@@ -135,7 +135,7 @@ def with_fades(scene: Scene, *fades: tuple[float, float, float]) -> Scene:
     return replace(scene, opacities=opaque, fades=np.array(fades, np.float32))
 
 
-def test_the_parts_are_the_ends(device: str) -> None:
+def test_split_strokes_are_their_visible_ends(device: str) -> None:
     """Drawn as paths: the first and the last cubic of each stroke, in its colour, as opaque as they were."""
     scene = with_fades(random_scene(Kind.STROKE, 2, seed=4), (0.05, -0.8, 0), (0, -0.9, -0.1))
     parts = split(scene, np.arange(2))

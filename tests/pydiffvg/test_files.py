@@ -43,7 +43,7 @@ def test_a_drawing_is_read_and_written(tmp_path: Path) -> None:
     assert torch.equal(render(*parsed[2:]), image)
 
 
-def test_segments_stay_what_they_are() -> None:
+def test_segments_keep_their_degree() -> None:
     (path,) = pydiffvg.from_svg_path("M2 2h14v12q-6 8 -14 0c1 2 3 4 5 6z")
     assert path.num_control_points.tolist() == [0, 0, 1, 2, 0]
     assert path.is_closed and len(path.points) == 8
@@ -77,7 +77,7 @@ RECT = '<rect width="9" height="9" fill="url(#g)"/>'
         (f'<radialGradient id="g" fx=".2">{STOPS}</radialGradient>{RECT}', "focus"),
     ],
 )
-def test_what_cannot_be_read_is_named(tmp_path: Path, body: str, cause: str) -> None:
+def test_unsupported_elements_are_named(tmp_path: Path, body: str, cause: str) -> None:
     path = tmp_path / "a.svg"
     text = f'<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{body}</svg>'
     path.write_text(text, encoding="utf-8")

@@ -135,7 +135,7 @@ VARIED: dict[str, tuple[Tensor, Callable[[Tensor], Tensor]]] = {
 
 
 @pytest.mark.parametrize("name", VARIED)
-def test_gradients_are_those_of_differences(name: str) -> None:
+def test_gradients_match_finite_differences(name: str) -> None:
     """Compare along two directions, for a smooth loss of all four channels."""
     values, draw = VARIED[name]
     generator, axis = torch.Generator().manual_seed(5), torch.linspace(0, 3, SIZE)[:, None]
@@ -181,7 +181,7 @@ def serialize(shapes: list[Shape], **more: Any) -> object:
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_what_is_not_supported_is_named_in_one_line(message: str) -> None:
+def test_unsupported_arguments_are_refused_in_one_line(message: str) -> None:
     with pytest.raises(UsageError, match=message) as caught:
         REFUSED[message]()
     assert "\n" not in str(caught.value)
@@ -207,7 +207,7 @@ def test_opacity_beyond_its_range_has_a_gradient() -> None:
     assert np.isfinite(color.grad.numpy()).all()
 
 
-def test_what_programs_read_of_the_interface() -> None:
+def test_module_attributes_of_diffvg() -> None:
     assert pydiffvg.RenderFunction.serialize_scene(SIZE, 40, [blob()], [group()])[:2] == [SIZE, 40]
     assert pydiffvg.device is first_device and pydiffvg.device.type == pydiffvg.get_device().type
     assert pydiffvg.use_gpu == torch.cuda.is_available()

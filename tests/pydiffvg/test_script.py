@@ -85,7 +85,7 @@ def test_a_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (tmp_path / "results/fit/final.png").exists()
 
 
-def test_what_is_not_supported_is_one_line_with_its_place(
+def test_unsupported_arguments_are_one_line_with_their_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     script = tmp_path / "unknown.py"
@@ -182,7 +182,7 @@ def test_copies_and_results_are_made_again(kind: str) -> None:
     assert torch.equal(second.tensors[0].detach(), values.detach().float())
 
 
-def test_a_width_that_nothing_shows_has_no_gradient_or_that_of_nothing() -> None:
+def test_an_invisible_width_has_a_zero_gradient() -> None:
     shapes, groups = scene()
     assert all(shapes[0].stroke_width is not each for each in cached(shapes, groups).tensors)
     width = shapes[0].stroke_width.requires_grad_()

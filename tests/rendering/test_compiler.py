@@ -26,7 +26,7 @@ def compile_now(work: Callable[[], object]) -> None:
     wait_for(partial(compile_later, lambda: work() and None))
 
 
-def test_what_the_compiler_raises_is_raised_where_it_is_waited_for() -> None:
+def test_exceptions_in_builds_reach_the_caller() -> None:
     def fail() -> None:
         raise ValueError("no such kernel")
 
@@ -56,7 +56,7 @@ def test_an_interrupted_wait_leaves_the_compiler_at_work(monkeypatch: pytest.Mon
     assert done.is_set()
 
 
-def test_at_the_end_only_what_has_begun_is_finished(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pending_builds_are_cancelled_at_exit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a compiler of its own, which has one core."""
     begun, go_on = threading.Event(), threading.Event()
 
@@ -89,7 +89,7 @@ def test_without_threads_the_caller_does_all(device: str, monkeypatch: pytest.Mo
     helpers.helpers.cache_clear()
 
 
-def test_what_a_piece_raises_reaches_the_caller() -> None:
+def test_exceptions_in_helper_threads_reach_the_caller() -> None:
     failing = Program(wp.get_device("cpu"), 2)
     started = threading.Barrier(2, timeout=10)
 

@@ -186,7 +186,9 @@ WAYS: dict[str, Callable[[int], object]] = {
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("side", [30_000, 200_000])
-def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_too_large_for_memory_are_refused(
+    way: str, side: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(memory, "machine_memory", lambda: 8 * 10**9)
     made: list[int] = []
     array = backend.Backend.array
@@ -201,12 +203,12 @@ def test_what_no_memory_holds(way: str, side: int, monkeypatch: pytest.MonkeyPat
     assert max(made, default=0) < 10**6
 
 
-def test_what_is_small_is_drawn_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_is_not_queried_for_small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "machine_memory", lambda: pytest.fail("asked"))
     assert warpsplat.render(SCENE, 80, device="cpu").shape == (80, 80, 4)
 
 
-def test_sides_beyond_any_number() -> None:
+def test_absurd_sizes_are_refused() -> None:
     for way in ("scene", "tensors"):
         with pytest.raises(UsageError, match=r"width must be a (whole )?number"):
             WAYS[way](10**400)
@@ -214,7 +216,7 @@ def test_sides_beyond_any_number() -> None:
         warpsplat.render(SCENE, scale=1e300, device="cpu")
 
 
-def test_on_a_gpu_what_is_free_counts() -> None:
+def test_free_memory_counts_on_a_gpu() -> None:
     """Others may have taken the rest."""
     gpu = cast(wp.Device, SimpleNamespace(is_cpu=False, free_memory=10**9, total_memory=10**11))
     check_memory(Viewport(4000, 4000), gpu)

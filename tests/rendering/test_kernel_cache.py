@@ -71,7 +71,7 @@ def test_a_damaged_cache_is_rebuilt(cache: Path, ending: str) -> None:
     assert len(list(cache.glob("wp_*"))) == 1, "what was damaged is gone"
 
 
-def test_what_another_processor_left_is_not_used(cache: Path) -> None:
+def test_binaries_of_another_processor_are_not_used(cache: Path) -> None:
     assert doubles()
     own = find(cache, ".o")
     own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
@@ -166,7 +166,7 @@ def test_each_kind_of_device_has_a_binary_of_its_own(tmp_path: Path, monkeypatch
         assert find(tmp_path, ending)
 
 
-def test_what_a_compiler_refuses_is_shown_in_its_words(
+def test_compiler_errors_are_shown(
     cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Once: another try, or another folder, would not help."""
@@ -189,7 +189,7 @@ def test_what_a_compiler_refuses_is_shown_in_its_words(
     ("fail", "words"),
     [("load", "loaded on cuda:0 (Test device): "), ("compile", "compiled for cuda:0 (Test device): ")],
 )
-def test_what_a_gpu_refuses_is_shown_in_its_words(
+def test_driver_errors_are_shown(
     fail: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path))

@@ -76,14 +76,14 @@ def test_two_stops_in_one_place_are_a_step(device: str) -> None:
     np.testing.assert_allclose(row[[9, 10, 29, 30]], colors, atol=1e-6)
 
 
-def test_what_is_empty_stays_exactly_empty(device: str) -> None:
+def test_empty_pixels_are_exactly_zero(device: str) -> None:
     image = renderer_for(transparent(disc(9, 40, 20)), device).read_image()
     assert image.shape == (40, 40, 4)
     assert not image[:8].any()
     np.testing.assert_allclose(image[20, 20], np.ones(4), atol=1e-6)
 
 
-def test_on_any_background_it_is_the_opaque_picture(device: str) -> None:
+def test_a_transparent_render_on_paper_equals_the_opaque_one(device: str) -> None:
     scene = with_gradients(mixed_scene(seed=3))
     clear = renderer_for(transparent(scene), device).read_image()
     opaque = renderer_for(scene, device).read_image()
@@ -123,7 +123,7 @@ def test_a_picture_lies_over_what_is_below(device: str, lanes: int, clear: bool)
 
 
 @pytest.mark.parametrize("lanes", [1, 64])
-def test_gradients_see_it(device: str, lanes: int) -> None:
+def test_gradients_through_pictures_match_finite_differences(device: str, lanes: int) -> None:
     """Those of shapes on either side are those of the composite; the picture has none."""
     below, above = random_scene(Kind.FILL, 3, 60, 50, seed=1), random_scene(Kind.FILL, 3, 60, 50, seed=2)
     scene = between(below, above, shown(30, 41))

@@ -142,7 +142,7 @@ for fault in ("", "capture", "graph", "graph", ""):
 """Run a program as a graph while graphs fail."""
 
 
-def test_a_gpu_does_without_graphs_that_it_refuses() -> None:
+def test_a_refused_graph_falls_back_to_launches() -> None:
     """Each kernel is launched by itself then, whatever number of CPU threads was asked for, and this is said
     once for each cause."""
     done = fake_cuda.run("-c", GRAPHS)

@@ -191,7 +191,7 @@ def truth(svg: str) -> FloatArray:
         (CIRCLE, 'stroke-dashoffset="1.5mm"', 'stroke-dashoffset="5.97"', 38),
     ],
 )
-def test_what_is_exact_is_nearer_to_the_truth_than_a_viewer(
+def test_exact_renders_are_nearer_to_supersampling_than_a_viewer(
     device: str, body: str, right: str, wrong: str, least: float
 ) -> None:
     """Hairlines and dashes; where they are a little elsewhere, it shows."""

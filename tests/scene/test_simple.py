@@ -56,7 +56,7 @@ def crossings(scene: Scene) -> int:
 
 @pytest.mark.parametrize("rule", ["nonzero", "evenodd"])
 @pytest.mark.parametrize("seed", range(6))
-def test_what_crosses_is_cut_and_looks_the_same(seed: int, rule: str) -> None:
+def test_crossing_contours_are_cut_and_look_the_same(seed: int, rule: str) -> None:
     scene = scene_of(f'd="{random_path(seed)}{random_path(seed + 100)}" fill-rule="{rule}"')
     assert crossings(scene) > 0
     made = simple(scene, 16)
@@ -65,7 +65,7 @@ def test_what_crosses_is_cut_and_looks_the_same(seed: int, rule: str) -> None:
     assert np.abs(pixels(made) - pixels(scene)).mean() < 0.001
 
 
-def test_what_does_not_cross_stays() -> None:
+def test_simple_contours_stay() -> None:
     scene = scene_of('d="M9 9h40v40h-40zM19 19v20h20v-20z"', f'd="{random_path(3)}" fill="none" stroke="red"')
     assert simple(scene, 16) is scene
 
@@ -119,7 +119,7 @@ def test_parts_have_their_holes() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_nothing_lies_under_anything(seed: int) -> None:
+def test_cut_out_scenes_have_no_overlaps(seed: int) -> None:
     colors = ("#f00", "#0a0", "#00f", "#cc0")
     scene = scene_of(*(f'd="{random_path(10 * seed + i)}" fill="{c}"' for i, c in enumerate(colors)))
     made = cut_out(scene, 16)
@@ -142,7 +142,7 @@ def test_edges_that_coincide_are_shared() -> None:
     assert corners[1] == [(30, 10), (30, 50), (50, 10), (50, 50)]
 
 
-def test_what_is_covered_is_left_out_and_translucent_shapes_hide_nothing() -> None:
+def test_covered_shapes_are_left_out_unless_seen_through() -> None:
     below, above = 'd="M20 20h9v9h-9z" fill="red"', 'd="M10 10h40v40h-40z" fill="blue"'
     assert len(cut_out(scene_of(below, above), 16)) == 1
     assert len(cut_out(scene_of(below, f'{above} fill-opacity=".5"'), 16)) == 2

@@ -84,7 +84,7 @@ def test_without_more_shapes_the_grid_gets_finer(scene: Scene) -> None:
     assert next_change([made(scene, 1000, 26.0, 100.0)], few) is None
 
 
-def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
+def test_the_background_is_fitted_to_what_shows_between_shapes(device: str) -> None:
     backend = Backend.on(device)
     scene = disc(10, 30, 15)
     wanted = np.array([0.2, 0.6, 0.8], np.float32)
@@ -98,7 +98,7 @@ def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
 
 
 @pytest.mark.parametrize("excess", [10, 60, 200])
-def test_what_is_less_than_a_shape_goes_by_points(excess: float) -> None:
+def test_small_excess_is_removed_by_points(excess: float) -> None:
     scene = random_scene(Kind.FILL, count=6, basis=Basis.SPLINE)
     sizes = path_sizes(scene, 1.0)
     seen = np.arange(1, 7, dtype=np.float32)
@@ -134,7 +134,7 @@ def quick() -> Settings:
     )
 
 
-def test_shapes_go_on_with_their_past() -> None:
+def test_the_next_fit_continues_optimizer_state() -> None:
     """The first step of another fit is the next one of the first: the optimizer forgot nothing."""
     settings, seen = quick(), list[Progress]()
     run, series = Run(Backend.on("cpu", 1), seen.append), Series(quick(), (4, 8))

@@ -125,7 +125,7 @@ def test_opacities_in_a_graph_stay_where_their_adjoint_is_right(capturing: Calla
     assert (image - render(tensors, 40)).abs().max() < 3e-3
 
 
-def test_a_graph_of_what_was_not_rendered_before_is_refused(capturing: Callable[[bool], None]) -> None:
+def test_capturing_an_unrendered_scene_is_refused(capturing: Callable[[bool], None]) -> None:
     capturing(True)
     with pytest.raises(UsageError, match="rendered before"):
         step(random_scene(Kind.FILL, 3))
@@ -166,7 +166,7 @@ def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[Tensor]:
 
 @pytest.mark.parametrize("threads", [1, 2, 3, 8])
 @pytest.mark.parametrize("scenes", [shifted(5), mixed(), shifted(1)], ids=["shifted", "mixed", "one"])
-def test_bits_are_those_of_single_calls(scenes: list[Scene], threads: int) -> None:
+def test_a_batch_has_the_bits_of_single_calls(scenes: list[Scene], threads: int) -> None:
     for one, other in zip(found(scenes, threads, at_once=True), found(scenes, 1, at_once=False), strict=True):
         assert torch.equal(one, other)
 

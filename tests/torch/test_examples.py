@@ -84,7 +84,7 @@ def test_a_network_compares(cat: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))
-def test_a_script_without_files_says_which_it_takes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_script_without_arguments_prints_its_usage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", [name])
     with pytest.raises(SystemExit, match=rf"usage: .*{name} "):
         runpy.run_path(str(EXAMPLES / name), run_name="__main__")
@@ -116,7 +116,7 @@ def outputs(notebook: Any) -> list[tuple[str, ...]]:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Jupyter's parts, about one another
 @NOTEBOOKS
-def test_it_runs_and_shows_what_is_stored(
+def test_notebooks_run_and_match_their_stored_outputs(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("nbclient")
@@ -131,7 +131,7 @@ def test_it_runs_and_shows_what_is_stored(
 
 
 @NOTEBOOKS
-def test_its_page_has_every_cell(path: Path) -> None:
+def test_pages_of_notebooks_have_every_cell(path: Path) -> None:
     assert path.stat().st_size < MAX_BYTES
     cells = json.loads(path.read_text("utf-8"))["cells"]
     page = from_script("page")(path)

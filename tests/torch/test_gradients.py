@@ -63,7 +63,7 @@ def test_opacities_of_one(name: str, transparent: bool) -> None:
 
 @pytest.mark.parametrize("name", ["mixed", "opaque", "gradients"])
 @pytest.mark.parametrize("threads", [1, 2])
-def test_colors_that_are_not_premultiplied(name: str, threads: int) -> None:
+def test_straight_colors(name: str, threads: int) -> None:
     """Opaque shapes hide others, some of which are faint or invisible."""
     opacities = np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32)
     opaque = replace(random_scene(Kind.FILL, 6, seed=4), opacities=opacities)
@@ -104,7 +104,7 @@ def whole(scene: Scene) -> dict[str, torch.Tensor | None]:
     return {name: value.grad for name, value in tensors.values.items()}
 
 
-def test_some_gradients_are_those_of_all() -> None:
+def test_gradients_of_one_tensor_equal_those_of_all() -> None:
     scene = with_gradients(mixed_scene(seed=2))
     wanted = whole(scene)
     for name in ("points", "frames", "stop_colors"):
@@ -167,7 +167,9 @@ def differences(loss: Callable[[Tensor], Tensor], at: Tensor) -> Tensor:
 
 @pytest.mark.parametrize("offset", OFFSETS)
 @pytest.mark.parametrize("name", SHAPES)
-def test_gradients_on_borders_are_those_of_differences(tmp_path: Path, name: str, offset: float) -> None:
+def test_gradients_on_pixel_borders_match_finite_differences(
+    tmp_path: Path, name: str, offset: float
+) -> None:
     shape = f'<g transform="translate({offset} {offset})">{SHAPES[name].format(**PAINTS)}</g>'
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIZE}" height="{SIZE}">{shape}</svg>'
     path = tmp_path / "shape.svg"

@@ -86,7 +86,7 @@ def test_twins_share_their_points_and_add_their_gradients() -> None:
     assert not np.array_equal(scene.points_of(0), twins().points_of(0))
 
 
-def test_the_scene_holds_what_a_file_can() -> None:
+def test_scene_values_are_clamped_to_what_a_file_can_hold() -> None:
     tensors = SceneTensors.of(with_gradients(random_scene(Kind.FILL)))
     for name, value, held in (("opacities", 1.2, 1), ("stop_offsets", -3, 0), ("colors", 2, 1)):
         tensors.values[name].fill_(value)
@@ -151,7 +151,7 @@ def test_a_module_is_a_loss() -> None:
     assert darker.scale.grad is None
 
 
-def test_values_and_gradients_are_those_of_torch() -> None:
+def test_loss_values_and_gradients_match_torch() -> None:
     image = np.random.default_rng(0).uniform(size=(9, 7, 3)).astype(np.float32)
     made = CustomLoss(Darker()).on("cpu")
     with torch.no_grad():  # a user's setting

@@ -99,7 +99,7 @@ def test_a_rounded_square_is_lines_and_arcs() -> None:
     assert count_corners(np.concatenate(parts)) == 0
 
 
-def test_many_runs_are_fitted_as_each_alone() -> None:
+def test_polylines_fitted_in_one_call_equal_those_fitted_singly() -> None:
     rng = np.random.default_rng(1)
     star = np.array([(0, 0), (9, 30), (40, 41), (10, 50), (1, 80), (-9, 50), (-40, 40), (-11, 30)], float)
     runs = [Polyline(ring(9.0, 50, squeeze=0.7), closed=True), Polyline(polygon(star), closed=True)]
@@ -129,7 +129,7 @@ def halves(cubic: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("t", [0.2, 0.5, 0.7])
 @pytest.mark.parametrize("name", CURVES)
-def test_the_halves_of_a_cubic_are_one_again(name: str, t: float) -> None:
+def test_merging_the_halves_of_a_cubic_restores_it(name: str, t: float) -> None:
     cubic = np.array(CURVES[name], float)
     handles = handles_through(*halves(cubic, t))
     made = np.stack([cubic[0], *handles, cubic[3]])
@@ -138,7 +138,7 @@ def test_the_halves_of_a_cubic_are_one_again(name: str, t: float) -> None:
     assert apart.max() < 0.02 * np.linalg.norm(cubic[3])
 
 
-def test_many_at_once_are_as_each_alone() -> None:
+def test_cubics_merged_in_one_call_equal_those_merged_singly() -> None:
     rng = np.random.default_rng(1)
     first, second = rng.normal(0, 5, (2, 30, 4, 2))
     second[:, 0] = first[:, 3]

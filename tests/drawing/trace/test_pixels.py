@@ -131,7 +131,7 @@ def enlarged(image: FloatArray, size: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("size", [1, 3, 10])
-def test_nothing_is_lost(size: int) -> None:
+def test_pixel_art_is_reproduced_exactly(size: int) -> None:
     image = enlarged(noise(16, 5), size)
     scene, per_pixel = trace_pixels(image)
     assert per_pixel == 1 / size
@@ -140,7 +140,7 @@ def test_nothing_is_lost(size: int) -> None:
     assert score.paths == 4, "and the ground"
 
 
-def test_what_is_empty_stays_empty() -> None:
+def test_transparent_cells_stay_transparent() -> None:
     image = np.concatenate([noise(16, 4), np.ones((16, 16, 1), np.float32)], axis=2)
     image[np.random.default_rng(1).random((16, 16)) < 0.3] = 0
     scene, per_pixel = trace_pixels(image)
@@ -167,6 +167,6 @@ def test_no_hairlines_at_a_zoom_that_ends_cells_within_pixels() -> None:
     assert len(load_scene(text, 12, 12, "cells.svg")[0]) == len(scene), "and the file can be read again"
 
 
-def test_one_colour_on_a_ground_abuts_nothing() -> None:
+def test_shape_rendering_is_left_out_for_one_colour() -> None:
     text = write_svg(trace_pixels(noise(12, 2))[0])
     assert "shape-rendering" not in text

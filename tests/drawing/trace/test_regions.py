@@ -26,7 +26,7 @@ def colors_of(found: Regions) -> set[tuple[int, ...]]:
     return {tuple(np.round(found.colorings[p].color).astype(int).tolist()) for p in found.paint.tolist()}
 
 
-def test_an_edge_pixel_belongs_to_what_has_most_of_it() -> None:
+def test_an_edge_pixel_belongs_to_the_region_with_most_coverage() -> None:
     found = find_regions(levels(draw(ground("#fff") + '<rect x="20.3" y="20.7" width="40" height="40"/>')))
     inside = found.labels == found.labels[40, 40]
     rows, columns = np.nonzero(inside)
@@ -69,7 +69,7 @@ def test_thin_bars_and_their_outlines_are_two_colours() -> None:
 
 
 @pytest.mark.parametrize("quality", [60, 85])
-def test_what_jpeg_leaves_is_no_region(quality: int) -> None:
+def test_jpeg_artefacts_make_no_regions(quality: int) -> None:
     body = ground("#264653") + '<rect x="16" y="14" width="30" height="60" fill="#e9c46a"/>'
     body += '<circle cx="68" cy="50" r="18" fill="#e76f51"/>'
     found = find_regions(levels(draw(body, jpeg=quality)))

@@ -104,7 +104,7 @@ def test_a_dot_beside_lines_and_on_one(paths: str) -> None:
     ],
     ids=["square", "broader line"],
 )
-def test_what_is_no_dot(paths: str, has_rings: bool) -> None:
+def test_shapes_that_are_not_dots(paths: str, has_rings: bool) -> None:
     parts = split(find_ink(drawn(paths)), mixed=False)
     assert bool(parts.rings) == has_rings
     assert not parts.dots

@@ -205,5 +205,5 @@ def test_guesses(image: FloatArray, subject: str) -> None:
 
 
 @pytest.mark.parametrize(("side", "subject"), [(16, "pixel"), (17, "photo")])
-def test_what_has_few_pixels_is_no_photograph(side: int, subject: str) -> None:
+def test_tiny_images_are_pixel_art(side: int, subject: str) -> None:
     assert guess_subject(grainy(photograph(side), 4)).subject == subject

@@ -110,7 +110,7 @@ def test_pixels_that_are_exact_stay_exact() -> None:
     assert (traced.joints != Joint.SMOOTH).all() and (traced.joints != Joint.FREE).all()
 
 
-def test_what_lies_below_goes_on_below() -> None:
+def test_lower_shapes_continue_below_upper_ones() -> None:
     """The square is four corners, the disc on its edge cuts nothing out of it."""
     body = ground("#fff") + '<rect x="10" y="20" width="50" height="50" fill="#357"/>'
     traced = trace(draw(body + '<circle cx="60" cy="45" r="18" fill="#e94"/>'))
@@ -150,7 +150,7 @@ def test_one_colour_and_nothing() -> None:
     assert len(empty.scene) == 0 and empty.scene.canvas.background is None
 
 
-def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them() -> None:
+def test_hidden_parts_do_not_show_through_gaps() -> None:
     image = np.zeros((64, 64, 4), np.float32)
     image[6:58, 6:58] = 0.1, 0.1, 0.1, 1
     image[10:54, 10:54, :3] = 0.9, 0.2, 0.1
@@ -160,7 +160,7 @@ def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them()
     assert render(trace(image).scene)[28:36, 28:42, 3].max() < 0.01
 
 
-def test_what_lies_in_a_bay_of_a_higher_line_is_seen() -> None:
+def test_visible_parts_in_concave_outlines_are_kept() -> None:
     """Three lines go round a square, the innermost below the others: the shortest way under the square from
     one end of the outer line to the other would cover it."""
     image = np.ones((96, 96, 3), np.float32)
