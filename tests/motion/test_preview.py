@@ -22,7 +22,6 @@ from warpsplat.motion.preview import (
     Protocol,
     best_protocol,
     has_true_color,
-    picture_size,
     terminal_size,
 )
 from warpsplat.scene import FloatArray
@@ -177,17 +176,6 @@ def test_pixel_protocols_draw_in_the_same_place(protocol: Protocol, end: str) ->
     if protocol == "kitty":
         numbers = re.findall(r"i=(\d+)", out.getvalue())
         assert len(numbers) == 2 and len(set(numbers)) == 1, "so the second replaces the first"
-
-
-@pytest.mark.parametrize(("width", "height"), [(300, 200), (20, 400), (4000, 10)])
-@pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (10, 8)])
-def test_pictures_fit_in_their_proportions(width: int, height: int, columns: int, lines: int) -> None:
-    size = picture_size(os.terminal_size((columns, lines)), width, height)
-    assert size and 1 <= size[0] < columns and 1 <= size[1] <= lines - 4
-    across, down = size[0], 2 * size[1]
-    zoom = min(across / width, down / height)
-    for side, drawn, unit in ((width, across, 1), (height, down, 2)):
-        assert abs(side * zoom - drawn) <= unit * (1 + side / min(width, height))
 
 
 @pytest.mark.parametrize(

@@ -113,14 +113,13 @@ def test_a_captured_engine_stays_as_it_is(capturing: Callable[[bool], None]) -> 
 
 def test_opacities_in_a_graph_stay_where_their_adjoint_is_right(capturing: Callable[[bool], None]) -> None:
     scene = random_scene(Kind.FILL, 3)
-    opaque = replace(scene, opacities=np.ones(3, np.float32))
     step(scene)
     capturing(True)
+    opaque = replace(scene, opacities=np.ones(3, np.float32))
     tensors = SceneTensors.of(opaque, requires_grad=True)
     image = render(tensors, 40)
     image.sum().backward()
-    gradients = [value.grad for value in tensors.values.values() if value.grad is not None]
-    assert all(gradient.isfinite().all() for gradient in gradients)
+    assert all(value.grad.isfinite().all() for value in tensors.values.values() if value.grad is not None)
     capturing(False)
     assert (image - render(tensors, 40)).abs().max() < 3e-3
 
