@@ -154,7 +154,7 @@ def test_dots_are_strokes_of_no_length(lines: str, radius: float, device: str) -
 
 
 def strokes(*lines: list[tuple[float, float]]) -> Scene:
-    points = np.array([np.linspace(*ends, 4) for ends in lines], np.float32)
+    points = np.array([np.linspace(a, b, 4) for a, b in lines], np.float32)
     scene = Scene.uniform(Kind.STROKE, Canvas(96, 72, None), points)
     return replace(scene, widths=np.full(len(lines), 4, np.float32))
 

@@ -24,7 +24,6 @@ from tests.paper.reference.grid import fold_area, grids
 from tests.reference.curves import tensors
 from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
 from warpsplat.kernels import constants
-from warpsplat.kernels.constants import TILE
 from warpsplat.metrics import psnr
 from warpsplat.paper.constants import COUNT_MAX, PLATEAU
 from warpsplat.paper.kernels.strips import bounded_product, normal_quantile, normal_tail
@@ -70,28 +69,6 @@ REFUSED = {
 def test_fills_without_two_chains_are_refused(device: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         renderer_for(REFUSED[message], device, model=SPLAT)
-
-
-@pytest.mark.parametrize("kind", list(Kind))
-def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, count=12, width=75, height=50, seed=4)
-    renderer = renderer_for(scene, device, model=SPLAT)
-    bins, grid = renderer.bins.buffers, grid_of(renderer)
-    first, last = bins.tile_first.numpy(), bins.tile_last.numpy()
-    slots, shapes = bins.sort_slots.numpy(), bins.slot_shape.numpy()
-    mean, extent = grid.mean.numpy(), grid.extent.numpy()
-    g_first, g_last = grid.gaussian_first.numpy(), grid.gaussian_last.numpy()
-    for tile in range(renderer.viewport.tile_count):
-        listed = [int(shapes[s]) for s in slots[first[tile] : last[tile]]]
-        assert listed == sorted(listed, reverse=True), "front (the last row) first, each shape once"
-        ty, tx = divmod(tile, renderer.viewport.tiles_x)
-        wanted = []
-        for shape in range(len(scene)):
-            low = (mean - extent)[g_first[shape] : g_last[shape]].min(axis=0)
-            high = (mean + extent)[g_first[shape] : g_last[shape]].max(axis=0)
-            if (high >= [TILE * tx, TILE * ty]).all() and (low < [TILE * (tx + 1), TILE * (ty + 1)]).all():
-                wanted.append(shape)
-        assert listed == wanted[::-1]
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -9,7 +9,7 @@ import pytest
 import torch
 import warp as wp
 
-from tests.helpers import SPLAT, adjoint, compare, outline_of, pieces_of, renderer_for
+from tests.helpers import compare, outline_of, pieces_of, renderer_for
 from tests.reference.curves import bezier, chain
 from tests.reference.outline import polyline
 from tests.scenes import (
@@ -26,7 +26,6 @@ from warpsplat.fit.optimizer import record_adam
 from warpsplat.fit.place import circle_splines
 from warpsplat.fit.settings import make_settings
 from warpsplat.kernels.constants import FLATNESS, FLATNESS_STROKE
-from warpsplat.rendering.models import EXACT, Model
 from warpsplat.scene import Basis, Kind, Rule, Scene
 
 
@@ -85,11 +84,6 @@ def test_image_and_gradients(device: str, kind: Kind, rule: Rule, lanes: int) ->
     compare(contours_scene(kind, rule, seed=3), device, 1.5, lanes=lanes)
 
 
-def test_the_rules_differ_where_contours_overlap(device: str) -> None:
-    images = [renderer_for(contours_scene(Kind.FILL, rule), device).read_image() for rule in Rule]
-    assert np.abs(images[0] - images[1]).max() > 0.1
-
-
 def test_a_fill_closes_its_open_contours(device: str) -> None:
     """As if a straight cubic led back, but for corners, which a ring rounds off by a hundredth of a px."""
     chain = random_scene(Kind.STROKE, 1, seed=4)
@@ -144,11 +138,6 @@ ODD: dict[str, list[Outline]] = {
 }
 
 
-def scene_for(model: Model, width: int = 40, height: int = 36, *, seed: int) -> Scene:
-    """Mixed as far as the model can show it."""
-    return mixed_scene(width, height, seed=seed, splines=model is EXACT)
-
-
 @pytest.mark.parametrize("seed", [0, 2])
 def test_exact(device: str, seed: int) -> None:
     compare(mixed_scene(seed=seed), device)
@@ -159,34 +148,3 @@ def test_exact(device: str, seed: int) -> None:
 @pytest.mark.parametrize("scale", [1.0, 1.6])
 def test_exact_of_any_lengths(device: str, shapes: list[Outline], scale: float) -> None:
     compare(ragged_scene(shapes, seed=1), device, scale)
-
-
-@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
-def test_depth_is_the_order_of_rows_whatever_the_kind(device: str, model: Model) -> None:
-    """Turned round, the scene is another picture, and the right one."""
-    scene = scene_for(model, seed=3)
-    turned = scene.take(np.arange(len(scene))[::-1])
-    a, b = (renderer_for(s, device, model=model).read_image() for s in (scene, turned))
-    assert np.abs(a - b).max() > 0.1
-    compare(turned, device, model=model)
-
-
-@pytest.mark.parametrize("model", [EXACT, SPLAT], ids=["exact", "splat"])
-def test_a_shape_alone_and_in_company_is_the_same(device: str, model: Model) -> None:
-    """The gradient of a shape that nothing overlaps does not depend on what else is in the arrays."""
-    scene = scene_for(model, 250, 40, seed=4)
-    for i in range(len(scene)):
-        points = scene.points_of(i)
-        points += np.array([25 * i + 12, 20], np.float32) - points.mean(axis=0)
-        points[:, 0] = np.clip(points[:, 0], 25 * i + 5, 25 * i + 20)
-    weights = np.random.default_rng(0).normal(size=(40, 250, 3)).astype(np.float32)
-    whole = renderer_for(scene, device, model=model)
-    together = adjoint(whole, weights)
-    for i in range(len(scene)):
-        one = renderer_for(scene.take(np.array([i])), device, model=model)
-        alone = adjoint(one, weights)
-        np.testing.assert_allclose(
-            together["points"][scene.first[i] : scene.first[i + 1]], alone["points"], atol=1e-4
-        )
-        for name in ("colors", "opacities", "widths"):
-            np.testing.assert_allclose(together[name][i], alone[name][0], rtol=1e-4, atol=1e-4)

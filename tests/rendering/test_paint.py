@@ -83,15 +83,6 @@ def test_empty_pixels_are_exactly_zero(device: str) -> None:
     np.testing.assert_allclose(image[20, 20], np.ones(4), atol=1e-6)
 
 
-def test_a_transparent_render_on_paper_equals_the_opaque_one(device: str) -> None:
-    scene = with_gradients(mixed_scene(seed=3))
-    clear = renderer_for(transparent(scene), device).read_image()
-    opaque = renderer_for(scene, device).read_image()
-    assert scene.canvas.background is not None
-    on = clear[..., :3] + (1 - clear[..., 3:]) * scene.canvas.background
-    np.testing.assert_allclose(on, opaque, atol=1e-5)
-
-
 def shown(height: int, width: int, seed: int = 0) -> Picture:
     """Opaque in the middle, thinner towards its edges, empty at them."""
     rng = np.random.default_rng(seed)

@@ -129,15 +129,6 @@ def test_splines_are_flattened_where_they_are(kind: Kind, beziers: int) -> None:
         np.testing.assert_allclose(line, want, atol=1e-5)
 
 
-def test_shapes_of_all_lengths_are_measured_in_their_own_rows() -> None:
-    scene = mixed_scene(seed=2)
-    for i in range(len(scene)):
-        one = scene.take(np.array([i]))
-        assert areas(scene)[i] > 0
-        np.testing.assert_allclose(areas(scene)[i], areas(one)[0], rtol=1e-5)
-        np.testing.assert_allclose(bounds(scene)[i], bounds(one)[0], rtol=1e-5)
-
-
 def test_an_enlarged_scene_looks_the_same() -> None:
     """Dashes grow with their strokes, and pixel art stays crisp."""
     scene = styled_scene(Cap.BUTT, Join.MITER, 0)

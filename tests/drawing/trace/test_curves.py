@@ -7,14 +7,12 @@ import pytest
 
 from tests.drawing.trace.drawings import draw, draw_exactly, ground, levels
 from warpsplat.drawing.trace.beziers import points_at
-from warpsplat.drawing.trace.corners import find_corners
 from warpsplat.drawing.trace.cubics import handles_through
-from warpsplat.drawing.trace.curves import Pieces, areas_of, fit_circles, fit_polylines
+from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, components
 from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.planar import find_loops
-from warpsplat.drawing.trace.polylines import Polylines
 from warpsplat.drawing.trace.regions import find_regions
 from warpsplat.drawing.trace.spans import Polyline
 
@@ -50,10 +48,6 @@ def fitted(points: Floats, tolerance: float = 0.2) -> Pieces:
     return pieces
 
 
-def count_corners(points: Floats) -> int:
-    return len(find_corners(Polylines([points], [True]), np.ones(1)).along)
-
-
 @pytest.mark.parametrize("radius", [3.0, 12.0, 40.0])
 def test_a_circle_is_four_cubics(radius: float) -> None:
     points = ring(radius) + noise(200, 2)
@@ -62,41 +56,6 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
     assert np.abs(np.hypot(*(sampled(pieces.cubics) - 50).T) - radius).max() < 0.03
     ends = pieces.cubics[:, 0] - pieces.cubics[:, 0].mean(axis=0)
     assert (np.abs(ends) < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
-
-
-def test_circles_keep_their_way_round_and_squares_and_ellipses_are_none() -> None:
-    square = polygon(np.array([(0, 0), (20, 0), (20, 20), (0, 20)], float))
-    found = fit_circles([square, ring(20), ring(20)[::-1], ring(20, squeeze=0.9), square[:4]], 0.2)
-    assert sorted(found) == [1, 2]
-    one, other = areas_of(np.stack([sampled(found[number]) for number in (1, 2)]))
-    assert one > 1250 and abs(one + other) < 1e-6
-
-
-def test_a_polygon_is_lines_between_its_corners() -> None:
-    corners = np.array([(10, 10), (60, 14), (40, 30), (70, 60), (12, 50)], float)
-    pieces = fitted(polygon(corners) + noise(len(polygon(corners)), 2))
-    assert pieces.lines.all() and len(pieces.cubics) == 5
-    found = pieces.cubics[:, 0]
-    off = np.hypot(*(found[:, None] - corners[None]).transpose(2, 0, 1)).min(axis=1)
-    assert off.max() < 0.3, "0.05 as a rule, 0.13 at most, of sixty such noises"
-    thirds = pieces.cubics[:, 0] + (pieces.cubics[:, 3] - pieces.cubics[:, 0]) / 3
-    assert np.allclose(pieces.cubics[:, 1], thirds)
-
-
-def test_a_rounded_square_is_lines_and_arcs() -> None:
-    side, radius = 60.0, 15.0
-    angle = np.linspace(0, np.pi / 2, 24)
-    parts = []
-    for k, center in enumerate([(45, 45), (15, 45), (15, 15), (45, 15)]):
-        turned = angle + k * np.pi / 2
-        parts.append(np.array(center) + radius * np.stack([np.cos(turned), np.sin(turned)], axis=1))
-        start = parts[-1][-1]
-        way = np.array([(-1, 0), (0, -1), (1, 0), (0, 1)][k])
-        parts.append(start + way * np.arange(1, side - 2 * radius)[:, None])
-    pieces = fitted(np.concatenate(parts))
-    assert pieces.lines.sum() == 4
-    assert len(pieces.cubics) <= 10
-    assert count_corners(np.concatenate(parts)) == 0
 
 
 def test_polylines_fitted_in_one_call_equal_those_fitted_singly() -> None:

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
-from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.fewer import fewer_regions
-from warpsplat.drawing.trace.grids import NO_REGION, components
+from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.inks import with_inks
-from warpsplat.drawing.trace.nesting import find_nesting
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions, find_regions
@@ -182,18 +180,6 @@ def stroke(ink: float, shown: float) -> Regions:
     return Regions(image, labels, fills, np.arange(2, dtype=np.int32), colorings, 0.0)
 
 
-def best_colors_of(regions: Regions) -> list[float]:
-    partition = with_best_colors(find_partition(regions), regions)
-    return [float(coloring.color[0]) for coloring in partition.colorings]
-
-
-def test_ink_has_the_colour_of_its_pixels() -> None:
-    paper, ink = best_colors_of(stroke(0, 60))
-    assert paper == 255
-    assert abs(ink - 60) < 4
-    assert best_colors_of(stroke(60, 60)) == best_colors_of(stroke(60, 61)) == [255, 60], "up to rounding"
-
-
 BROWN, BLUE = (120, 80, 40), (60, 110, 160)
 
 
@@ -226,36 +212,3 @@ def test_lines_of_one_colour_have_one_ink(color: tuple[int, int, int]) -> None:
     _, *inks = sorted(np.unique(fills.reshape(-1, 4), axis=0).tolist(), reverse=True)
     assert len(inks) == 1
     assert np.abs(np.array(inks[0][:3]) - color).max() < 32
-
-
-def _rings(*opacities: float) -> Regions:
-    """Squares inside one another, black, on a clear ground."""
-    labels = np.zeros((48, 48), np.int32)
-    for number in range(1, len(opacities) + 1):
-        labels[4 * number : 48 - 4 * number, 4 * number : 48 - 4 * number] = number
-    colorings = [Coloring(np.array([0, 0, 0, opacity]), is_band=True) for opacity in (0.0, *opacities)]
-    colorings[0] = Coloring(np.zeros(4))
-    fills = np.array([coloring.color for coloring in colorings], np.float32)[labels]
-    return Regions(fills, labels, fills, np.arange(len(colorings)), colorings, 0.0)
-
-
-def test_a_darker_band_lies_on_the_fainter_one_around_it() -> None:
-    regions = _rings(20, 80, 140)
-    nesting = find_nesting(regions)
-    assert nesting.parent.tolist() == [NO_REGION, NO_REGION, 1, 2]
-    assert nesting.depth.tolist() == [0, 0, 1, 2]
-    assert nesting.shown(0).tolist() == [0, 1, 1, 1]
-    assert nesting.shown(1).tolist() == [0, 1, 2, 2]
-    through = 1.0
-    for region, wanted in ((1, 20), (2, 80), (3, 140)):
-        through *= 1 - nesting.colorings[region].color[3] / 255
-        assert abs(255 * (1 - through) - wanted) < 0.01
-    assert nesting.ordered(np.array([-1, 5, 7, 9])).tolist() == [-1, 0, 1, 2]
-
-
-def test_a_dark_ring_lies_on_the_fainter_band_inside_it() -> None:
-    nesting = find_nesting(_rings(80, 20))
-    assert nesting.parent.tolist() == [NO_REGION, 2, NO_REGION]
-    assert nesting.colorings[2].color[3] == 20
-    too_faint_to_be_painted = find_nesting(_rings(2, 20, 80))
-    assert too_faint_to_be_painted.parent.tolist() == [NO_REGION, NO_REGION, NO_REGION, 2]

@@ -45,29 +45,11 @@ def test_ink_is_told_from_paper(kind: str) -> None:
     assert kind != "plain" or np.abs(ink.cover - share).max() < 0.1
 
 
-STAR = '<path d="M30 8l7 21h22l-18 13 7 21-18-13-18 13 7-21L1 29h22z" fill="#000" stroke="none"/>'
-
-
 def test_a_partly_covered_edge_is_measured_although_ink_is_broad() -> None:
     image = drawn('<path d="M20.25 12H60V60H20.25z" fill="#000" stroke="none"/><path d="M70 5V60"/>')
     areas = split(find_ink(image), mixed=True).areas
     assert areas is not None
     assert np.allclose(areas.cover[20:50, 20], 0.75, atol=0.02)
-
-
-def test_tips_belong_to_their_area() -> None:
-    parts = split(find_ink(drawn(STAR + '<path d="M66 10V60M66 30H90"/>')), mixed=True)
-    thin, areas = parts.thin, parts.areas
-    assert areas is not None
-    assert areas.labels.max() == 1
-    assert np.nonzero(thin.mask)[1].min() > 60
-
-
-def test_pens_have_the_colour_of_their_areas() -> None:
-    image = drawn('<circle cx="30" cy="36" r="16" fill="#c00" stroke="none"/><path d="M60 5V60M60 30H90"/>')
-    drawing = trace_ink(find_ink(image, mixed=True), mixed=True)
-    assert np.allclose(drawing.pens[drawing.area_pens[0]], [0.8, 0, 0], atol=0.01)
-    assert drawing.lines[0].pen != drawing.area_pens[0]
 
 
 def test_ends_far_from_areas_stay() -> None:
