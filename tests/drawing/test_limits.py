@@ -5,11 +5,9 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
-import math
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +20,15 @@ from tests import ROOT
 from tests.drawing.drawings import vectorized
 from tests.drawing.trace.drawings import LOGO, draw
 from tests.runs import scored
-from tests.scenes import disc
-from warpsplat.drawing import draft as drafts
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import byte_price
-from warpsplat.drawing.draw import DEARER, TRIES, announce_fit, announce_trace, within
+from warpsplat.drawing.draw import announce_fit, announce_trace
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.tidy import finish_drawing
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.errors import ImageError
-from warpsplat.fit.problem import Fit, Run
+from warpsplat.fit.problem import Run
 from warpsplat.fit.settings import Settings, Subject, make_settings
-from warpsplat.portable.filters import boxed
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.prepare import choose_subject
 from warpsplat.scene import FloatArray
@@ -79,29 +74,6 @@ def wavy() -> FloatArray:
     return np.asarray(image, np.float32)
 
 
-def within_600(size: Callable[[float], float]) -> tuple[float, list[float]]:
-    """Return the size of the drawing within 600 bytes, and the prices that were tried."""
-    asked: list[float] = []
-    scene = disc(9, 40, 20)
-
-    def draw(price: float) -> Fit:
-        asked.append(price)
-        return Fit(scene, size(price), math.nan, math.nan, 0, False)
-
-    usual = Fit(scene, 1000, math.nan, math.nan, 0, False)
-    made = within(600, usual, draw, lambda made: round(made.per_pixel), 1.0, lambda: False)
-    return made.per_pixel, asked
-
-
-def test_the_lowest_price_that_meets_the_size_is_found() -> None:
-    size, asked = within_600(lambda price: 1000 - 150 * np.log2(price))
-    assert 590 < size <= 600
-    assert len(asked) <= TRIES
-    size, asked = within_600(lambda price: 900 - price / DEARER**TRIES)
-    assert size == 899, "the dearest one, as nothing fits"
-    assert len(asked) == TRIES
-
-
 def test_a_size_limit_does_not_change_the_subject() -> None:
     image = draw(LOGO)
     settings, why, _ = choose_subject(image, make_settings(max_bytes="1KB"))
@@ -121,22 +93,6 @@ def test_long_runs_are_announced(caplog: pytest.LogCaptureFixture) -> None:
     nodes, pixels = caplog.messages
     assert "12,000 nodes takes about 7 s" in nodes
     assert "tracing its 2.2 megapixels takes about 9 s" in pixels
-
-
-@pytest.mark.parametrize(("time_left", "factor"), [(math.inf, 1), (400, 1), (40, 2), (10, 4)])
-def test_a_trace_ends_in_time_by_fewer_pixels(
-    time_left: float, factor: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The first four looks at the clock take 8 s each."""
-    clock = itertools.count()
-    monkeypatch.setattr(time, "monotonic", lambda: 8.0 * min(next(clock), 4))
-    monkeypatch.setattr(drafts, "QUICK_PIXELS", 1000)
-    image = draw(LOGO)
-    run = Run(lambda: pytest.fail("a trace needs no device"), deadline=time_left)
-    made = drafts.trace_in_time(image, None, None, 1.0, Settings(), run).scene
-    small = trace(boxed(image, factor) if factor > 1 else image).scene
-    assert (made.points == factor * small.points).all()
-    assert (made.canvas.width, made.canvas.height) == image.shape[1::-1]
 
 
 @pytest.mark.parametrize("budget", [1, 12, 30, 60, 120])

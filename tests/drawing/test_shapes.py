@@ -35,7 +35,6 @@ from warpsplat.scene import Canvas, Paint
 from warpsplat.scene.attributes import Joint
 from warpsplat.svg.primitives import Primitive, primitives
 from warpsplat.svg.read import load_scene
-from warpsplat.svg.sizes import USE
 from warpsplat.svg.write import rounded as rounded_scene
 from warpsplat.svg.write import write_svg
 
@@ -220,15 +219,6 @@ def test_the_price_of_a_basic_shape_matches_its_bytes(outline: Outline) -> None:
     joined = drawing(LARGE, (BLUE, [other, outline])), drawing(LARGE, (BLUE, [other]))
     taken = min(written(made) - bare, each(*joined, 1))
     assert abs(taken - prices.of_primitive(whole)) <= 4
-
-
-def test_the_price_of_an_equal_outline_matches_its_bytes() -> None:
-    one, joints = ring(7, 0, bent=True)
-    shifts = np.random.default_rng(4).integers(-40, 40, (COUNT, 2))
-    made = drawing(LARGE, *((BLUE, [(np.round(one, 1) + shift, joints)]) for shift in shifts))
-    few = made.take(np.arange(COUNT // 2))
-    taken = (written(made, symbols=True) - written(few, symbols=True)) / (COUNT // 2)
-    assert taken == pytest.approx(USE, abs=3)
 
 
 def test_the_worth_of_a_byte() -> None:

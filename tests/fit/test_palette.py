@@ -15,7 +15,7 @@ from tests.scenes import random_scene, with_stops
 from warpsplat.errors import UsageError
 from warpsplat.fit.options import parse_palette
 from warpsplat.fit.paints import choose_paints, with_ramps, without_gradients
-from warpsplat.fit.palette import best_colors, main_colors
+from warpsplat.fit.palette import best_colors
 from warpsplat.fit.ramps import Ramps, RampSolver
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import psnr
@@ -81,17 +81,6 @@ def test_the_error_is_least_at_the_best_colour(opacity: float, *, transparent: b
         around = error(best + off), error(best - off)
         assert min(around) > least
         assert around[0] == pytest.approx(around[1], rel=1e-3)
-
-
-def test_main_colours_are_the_pictures_own() -> None:
-    own = np.array([[255, 0, 0], [0, 128, 255], [20, 20, 20]], np.float32) / 255
-    rng = np.random.default_rng(0)
-    colors = own[rng.integers(0, 3, 3000)]
-    blurred = np.clip(colors[:200] + rng.normal(0, 0.05, (200, 3)), 0, 1).astype(np.float32)
-    everything = np.concatenate([colors, blurred])
-    found = main_colors(everything, np.ones(len(everything), np.int64), 3)
-    assert {tuple(color) for color in found} == {tuple(color) for color in own}
-    assert len(main_colors(own, np.ones(3, np.int64), 8)) == 3
 
 
 def test_palettes_as_texts(tmp_path: Path) -> None:
