@@ -24,7 +24,7 @@ from warpsplat.search.candidate import (
     smaller,
 )
 from warpsplat.search.goal import AIM_FULL, next_change
-from warpsplat.search.series import Series, begin_of, growing
+from warpsplat.search.series import Series, begin_of
 from warpsplat.svg.write import path_sizes
 
 
@@ -115,17 +115,6 @@ def test_a_fit_begins_where_its_schedule_has_as_many_shapes(few: int, share: flo
     assert begin == pytest.approx(1000 * share, abs=25) and begin % 25 == 0
     if few == 180:
         assert shapes_at(settings, begin) == pytest.approx(1.5 * few, rel=0.1)
-
-
-@pytest.mark.parametrize(("few", "many"), [(50, 200), (200, 250), (10, 9000)])
-def test_the_schedule_goes_on_from_the_shapes_that_there_are(few: int, many: int) -> None:
-    settings, full = make_settings(curves=many), round(1.5 * few)
-    begin = begin_of(settings, full)
-    chosen = growing(settings, full, begin)
-    assert shapes_at(chosen, begin) == pytest.approx(full, rel=0.02) or chosen.density.start == 1e-3
-    counts = [shapes_at(chosen, step) for step in range(begin, 501, 25)]
-    assert counts == sorted(counts) and counts[-1] == round(1.5 * many)
-    assert all(shapes_at(chosen, step) == shapes_at(settings, step) for step in (700, 1000))
 
 
 def quick() -> Settings:

@@ -12,7 +12,7 @@ import torch
 
 import warpsplat
 from tests.fit.pictures import picture
-from tests.scenes import disc, random_scene, with_gradients
+from tests.scenes import random_scene, with_gradients
 from warpsplat import CustomLoss
 from warpsplat.errors import UsageError
 from warpsplat.fit.custom_loss import evaluate
@@ -21,7 +21,7 @@ from warpsplat.scene import FloatArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
-from warpsplat.torch import Module, SceneTensors, over, render
+from warpsplat.torch import Module, SceneTensors, render
 
 
 def twins() -> Scene:
@@ -53,21 +53,6 @@ def test_project_clamps_to_the_bounds() -> None:
     assert {round(x, 4) for x in found["opacities"]} <= set(OPACITY_RANGE)
     assert found["colors"] <= {0.0, 1.0} and found["points"] <= {-40.0, 80.0}
     assert found["widths"] <= {1.0, 40.0}
-
-
-def test_training_approaches_its_target() -> None:
-    wanted = render(SceneTensors.of(disc(11, 40, 22)))
-    module = Module(replace(disc(6, 40, 14), colors=np.full((1, 3), 0.5, np.float32)))
-    optimizer = torch.optim.Adam(module.parameter_groups(rate=0.5), betas=(0.9, 0.99))
-    losses = []
-    for _ in range(60):
-        optimizer.zero_grad()
-        loss = (over(module(), 0.0) - wanted[..., :3]).square().mean()
-        loss.backward()
-        optimizer.step()
-        module.project()
-        losses.append(loss.item())
-    assert losses[-1] < losses[0] / 30
 
 
 def test_twins_share_their_points_and_add_their_gradients() -> None:
