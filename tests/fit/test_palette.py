@@ -16,7 +16,7 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.options import parse_palette
 from warpsplat.fit.paints import choose_paints, with_ramps, without_gradients
 from warpsplat.fit.palette import best_colors
-from warpsplat.fit.ramps import Ramps, RampSolver
+from warpsplat.fit.ramps import RampSolver
 from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
@@ -173,17 +173,6 @@ def error(scene: Scene, target: FloatArray, device: str) -> float:
     return float((difference**2).mean())
 
 
-def only(ramps: Ramps, kind: Paint, scene: Scene, shape: int = 0) -> Scene:
-    """Return ``scene`` with one shape's ramp in place of its colour."""
-    chosen = np.arange(len(scene)) == shape
-    return with_ramps(scene, chosen, np.full(len(scene), kind, np.int32), ramps)
-
-
-def places() -> tuple[np.ndarray, np.ndarray]:
-    y, x = np.mgrid[:SIZE, :SIZE] + 0.5
-    return x, y
-
-
 @pytest.mark.parametrize("clear", [False, True])
 def test_gains_are_decreases_of_the_error(device: str, clear: bool) -> None:
     """Beyond the best flat colour, for translucent shapes behind others."""
@@ -194,7 +183,7 @@ def test_gains_are_decreases_of_the_error(device: str, clear: bool) -> None:
         colors=0.35 + np.float32(0.3) * scene.colors,
     )
     image = render(scene, backend=Backend.on(device))
-    x, y = places()
+    y, x = np.mgrid[:SIZE, :SIZE] + 0.5
     # So little that no stop leaves [0, 1], and beyond the ends of a ramp next to nothing is seen.
     wave = 0.05 * np.stack([x / SIZE, y / SIZE, np.hypot(x, y) / SIZE], axis=2)
     target = image.copy()
@@ -206,7 +195,8 @@ def test_gains_are_decreases_of_the_error(device: str, clear: bool) -> None:
         for shape in counted:
             own = np.arange(len(scene)) == shape
             flat = without_gradients(scene, own, solver.flat)
-            fall = error(flat, target, device) - error(only(ramps, kind, scene, shape), target, device)
+            bent = with_ramps(scene, own, np.full(len(scene), kind, np.int32), ramps)
+            fall = error(flat, target, device) - error(bent, target, device)
             # Ends that a shape hides in part take up to a quarter off, over five scenes.
             assert fall == pytest.approx(ramps.gain[shape], rel=0.5)
         seen += len(counted)

@@ -19,31 +19,16 @@ from warpsplat.fit.rounding import (
     choose_grid,
 )
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import ExactModel
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
+from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, Kind, Scene
 from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import premultiplied, render_own
 from warpsplat.svg.write import GRIDS, rounded
 
-SETTINGS = make_settings(iterations=100)
+SETTINGS = make_settings()
 OPAQUE = np.float32(OPACITY_RANGE[1])
-
-
-def advanced(step: Step) -> Scene:
-    """Do a few steps and return the scene."""
-    for _ in range(3):
-        step.advance()
-    return step.state.scene()
-
-
-def step_of(scene: Scene, device: str, image: FloatArray | None = None) -> Step:
-    """After a few steps."""
-    step = step_for(scene, picture() if image is None else image, device, SETTINGS)
-    advanced(step)
-    return step
 
 
 @pytest.mark.parametrize("staged", [True, False])
@@ -56,7 +41,9 @@ def test_the_coarsest_grid_within_the_loss(
     start = mixed_scene(64, 48, seed=1)
     noise = np.random.default_rng(0).normal(0, 0.1, (48, 64, 3))
     image = (render(start, backend=Backend.on(device)) + noise).astype(np.float32)
-    step = step_of(start, device, image)
+    step = step_for(start, image, device, make_settings(iterations=100))
+    for _ in range(3):
+        step.advance()
     scene = step.state.scene()
     grid = choose_grid(step, staged=staged)
 
@@ -101,32 +88,24 @@ def test_runs_of_few_steps_keep_to_the_precision(device: str, iterations: int, p
     assert made.per_pixel <= 10**precision
 
 
-PLAIN = make_settings()
-
-
 def shown(scene: Scene) -> np.ndarray:
-    return premultiplied(render_own(export(scene, PLAIN, 10.0))) / 255
-
-
-def spilling() -> tuple[Scene, np.ndarray]:
-    """Return a disc, and the image of a smaller one."""
-    scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
-    return scene, shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
+    return premultiplied(render_own(export(scene, SETTINGS, 10.0))) / 255
 
 
 def test_outlines_are_drawn_back_no_further_than_needed(device: str) -> None:
-    scene, target = spilling()
+    scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
+    target = shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
     empty = target[..., 3] == 0
     assert shown(scene)[empty].any()
-    cleared = clear_empty(scene, target, PLAIN, Run(Backend.on(device)), 10.0)
+    cleared = clear_empty(scene, target, SETTINGS, Run(Backend.on(device)), 10.0)
     assert not shown(cleared)[empty].any()
     assert np.abs(cleared.points - scene.points).max() < 1.5
     late = Run(Backend.on(device), deadline=-math.inf)
-    assert clear_empty(scene, target, PLAIN, late, 10.0) is scene
+    assert clear_empty(scene, target, SETTINGS, late, 10.0) is scene
 
 
 def test_a_clear_scene_stays_as_it_is(device: str) -> None:
     scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE)
     scene = replace(scene, canvas=Canvas(40, 36, None))
-    cleared = clear_empty(scene, shown(scene), PLAIN, Run(Backend.on(device)), 10.0)
+    cleared = clear_empty(scene, shown(scene), SETTINGS, Run(Backend.on(device)), 10.0)
     np.testing.assert_array_equal(cleared.points, rounded(scene, 10.0).points)

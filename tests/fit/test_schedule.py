@@ -21,7 +21,7 @@ from warpsplat.fit.schedule import (
     phases,
     shapes_at,
 )
-from warpsplat.fit.settings import QUALITIES, Quality, Settings, make_settings
+from warpsplat.fit.settings import QUALITIES, Quality, make_settings
 from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 
@@ -51,17 +51,13 @@ def test_one_scale_serves_both_sides(width: int, height: int, quality: Quality) 
         assert phase.width * phase.height <= width * height
 
 
-def densification_steps(settings: Settings) -> list[int]:
-    """Return the steps after which there is densification; 0 for the start."""
-    density = settings.density
-    return list(range(0, math.ceil(density.stop * settings.iterations), density.interval))
-
-
 @pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("iterations", [1, 26, 30, 60, 100, 101, 333, 1000])
 def test_all_shapes_and_no_more_are_there_in_the_end(quality: Quality, iterations: int) -> None:
     settings = make_settings(quality, curves=90, iterations=iterations)
-    assert shapes_at(settings, densification_steps(settings)[-1]) == 90
+    density = settings.density
+    last = range(0, math.ceil(density.stop * iterations), density.interval)[-1]
+    assert shapes_at(settings, last) == 90, "after the last densification"
     without = replace(settings, density=replace(settings.density, interval=0))
     assert shapes_at(without, 0) == 90
 

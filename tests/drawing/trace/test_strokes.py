@@ -12,7 +12,7 @@ from tests.drawing.trace.line_art import CROSS, drawn, traced
 from warpsplat.drawing.line_art import with_equal_widths
 from warpsplat.drawing.strokes.broad import split
 from warpsplat.drawing.strokes.ink import find_ink
-from warpsplat.drawing.strokes.lines import CenterLine, trace_ink
+from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.drawing.strokes.tour import toured
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 
@@ -92,13 +92,9 @@ def test_shapes_that_are_not_dots(paths: str, has_rings: bool) -> None:
     assert not parts.dots
 
 
-def lines_of(paths: str) -> list[CenterLine]:
-    return trace_ink(find_ink(drawn(paths))).lines
-
-
 @pytest.mark.parametrize("width", [1.5, 2, 4, 6])
 def test_widths_are_measured(width: float) -> None:
-    (line,) = lines_of(f'<path d="M15 20Q50 5 80 55" stroke-width="{width}"/>')
+    (line,) = trace_ink(find_ink(drawn(f'<path d="M15 20Q50 5 80 55" stroke-width="{width}"/>'))).lines
     assert line.width == pytest.approx(width, abs=0.2)
 
 
