@@ -15,22 +15,15 @@ SCENES = {
 }
 
 
-def with_a_past(parameters: Parameters) -> dict[str, list[np.ndarray]]:
-    """Random moments, by attribute; ages from 10 on."""
-    rng = np.random.default_rng(0)
-    moments = {}
-    for name, group in parameters.groups.items():
-        moments[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
-        group.moment1.assign(moments[name][0])
-        group.moment2.assign(moments[name][1])
-    parameters.arrays["ages"].assign(np.arange(10, 10 + parameters.shape_count, dtype=np.int32))
-    return moments
-
-
 @pytest.mark.parametrize(("scene", "added"), SCENES.values(), ids=SCENES.keys())
 def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scene) -> None:
     parameters = Parameters(scene, Backend.on(device))
-    before = with_a_past(parameters)
+    rng, before = np.random.default_rng(0), {}
+    for name, group in parameters.groups.items():
+        before[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
+        group.moment1.assign(before[name][0])
+        group.moment2.assign(before[name][1])
+    parameters.arrays["ages"].assign(np.arange(10, 10 + parameters.shape_count, dtype=np.int32))
     keep = np.array([4, 0, 3, 5])
     parameters.rearrange(keep, added)
     after, wanted = parameters.scene(), scene.take(keep).append(added)
