@@ -13,6 +13,7 @@ from PIL import Image
 
 from tests.scenes import mixed_scene, with_gradients
 from warpsplat import Canvas, Recorder, Result, Scene, UsageError
+from warpsplat.errors import CapacityError
 from warpsplat.files.output import may_replace
 from warpsplat.fit.export import export
 from warpsplat.fit.progress import Progress, Snapshot
@@ -22,6 +23,7 @@ from warpsplat.motion import films, recorder
 from warpsplat.motion.timing import HOLD
 from warpsplat.motion.training import Painter
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene.geometry import enlarged
 from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
 from warpsplat.svg.write import GRIDS
@@ -137,14 +139,37 @@ def test_sides_of_films(size: tuple[int, int], width: int | None) -> None:
     assert size != (640, 480) or not width or zoom == width / 640
 
 
-@pytest.mark.parametrize("renderer", ["exact", "splat", "gaussian"])
+@pytest.mark.parametrize("renderer", ["exact", "splat", "gaussian", "none"])
 @pytest.mark.parametrize("scene", [FLAT, with_gradients(FLAT), CLEAR], ids=["flat", "gradients", "clear"])
-def test_frames_look_as_a_viewer_shows_the_file(renderer: str, scene: Scene) -> None:
-    settings = Settings(renderer=renderer)
+def test_frames_look_as_a_viewer_shows_the_file(
+    renderer: str, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The viewer draws what the renderer cannot, as too many shapes."""
+
+    def refuses(*_: object) -> None:
+        raise CapacityError("too many")
+
+    if renderer == "none":
+        monkeypatch.setattr(Renderer, "grow", refuses)
+    settings = Settings(renderer="exact" if renderer == "none" else renderer)
     painted = Painter(Backend.on("cpu", 1), settings, (96, 72)).paint(scene, 2.0)
     seen = render_svg(export(scene, settings, GRIDS[-1]), zoom=2.0)
     assert painted.size == (96, 72)
-    assert psnr(premultiplied(painted), premultiplied(seen)) > 36, "39.9 to 42.8 dB over five scenes"
+    least = 45 if renderer == "none" else 36
+    assert psnr(premultiplied(painted), premultiplied(seen)) > least, "39.9 to 42.8 dB over five scenes"
+
+
+def test_recorded_scenes_are_limited_in_number_and_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first and the last scene are kept."""
+    scene = mixed_scene()
+    scenes = [replace(scene, widths=np.full_like(scene.widths, i)) for i in range(250)]
+    monkeypatch.setattr(recorder, "MAX_SCENES", 60)
+    made = recorder_of(scenes)
+    assert 30 < len(made.scenes) <= 60
+    assert [int(scene.widths[0]) for scene in made.scenes] == made.moments
+    assert (made.moments[0], made.moments[-1]) == (0, 249)
+    monkeypatch.setattr(recorder, "MAX_BYTES", 10 * recorder._bytes_of(scene))
+    assert 5 <= len(recorder_of(scenes[:100]).scenes) <= 10
 
 
 def test_a_missing_video_package_is_named(
