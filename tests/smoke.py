@@ -27,7 +27,6 @@ SMOKE = {
     "trace": ("drawing/trace/test_trace.py::test_a_logo", "drawing/trace/test_curves.py"),
     "fit": (
         "fit/test_step.py::test_evaluating_a_file_that_outgrows_the_arrays",
-        "fit/test_new_loss.py::test_an_image_loss",
         "run/test_vectorize.py::test_the_loss_falls_and_the_count_stays",  # photographs
         "drawing/test_line_art.py::test_jpeg_and_grey_paper",  # line art
         "drawing/test_subjects.py::test_figures_are_of_the_file_that_is_delivered",  # drawings

@@ -1,13 +1,18 @@
-"""Drawings for tests: shapes of corners, lines and smooth joints."""
+"""Drawings for tests: shapes of corners, lines and smooth joints; and whole runs."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from tests.runs import vectorize
 from warpsplat.drawing.constraints import Drawing
+from warpsplat.fit.settings import make_settings
+from warpsplat.rendering.backend import Backend
+from warpsplat.run.result import Result
 from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 from warpsplat.scene.attributes import Joint
 from warpsplat.scene.scene import starts_of
@@ -20,6 +25,10 @@ ARC = 0.5522847498
 
 LINE = [Joint.CORNER, Joint.LINE_HANDLE, Joint.LINE_HANDLE]
 ROUND = [Joint.SMOOTH, Joint.FREE, Joint.FREE]
+
+
+def vectorized(image: FloatArray, device: str, subject: str = "drawing", **options: Any) -> Result:
+    return vectorize(image, make_settings(subject=subject, **options), Backend.on(device))
 
 
 def turned(points: np.ndarray, angle: float, centre: tuple[float, float]) -> np.ndarray:

@@ -10,8 +10,7 @@ import pytest
 from tests.drawing.drawings import BLUE, GOLD, WHITE, disc, drawing, logo, polygon
 from warpsplat.drawing.constraints import Constraints, Drawing, with_ends
 from warpsplat.drawing.fit_outlines import OutlineFit, matching
-from warpsplat.drawing.measure import pixels_around
-from warpsplat.drawing.model import errors, fitted
+from warpsplat.drawing.model import errors
 from warpsplat.drawing.solve import Equations, newton_step
 from warpsplat.fit.problem import Run
 from warpsplat.rendering.backend import Backend
@@ -25,7 +24,7 @@ def moved(made: Drawing, offset: tuple[float, float]) -> Drawing:
 
 
 @pytest.mark.parametrize("background", [WHITE, None], ids=["opaque", "transparent"])
-def test_the_image_tells_where_outlines_are(device: str, background: FloatArray | None) -> None:
+def test_measured_places_and_errors_match_a_known_shift(device: str, background: FloatArray | None) -> None:
     """And what moving them costs: the error of the samples is that of the render."""
     exact = drawing(
         Canvas(64, 64, background),
@@ -49,7 +48,7 @@ def test_the_image_tells_where_outlines_are(device: str, background: FloatArray 
     assert total == pytest.approx(fit.error, rel=0.25)
 
 
-def test_the_gradient_is_that_of_the_render(device: str) -> None:
+def test_the_gradient_matches_finite_differences(device: str) -> None:
     """Against central differences along free numbers."""
     backend = Backend.on(device, 1)
     exact = logo()
@@ -66,7 +65,7 @@ def test_the_gradient_is_that_of_the_render(device: str) -> None:
         assert (ends[0] - ends[1]) / 4e-3 == pytest.approx(gradient @ way, rel=0.05, abs=2e-6)
 
 
-def test_the_normal_equations() -> None:
+def test_a_newton_step_matches_dense_normal_equations() -> None:
     """Against dense ones in float64."""
     made, rng = logo(), np.random.default_rng(1)
     fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
@@ -105,24 +104,3 @@ def test_the_normal_equations() -> None:
     matrix = wide.T @ full @ wide + np.diag(added + least)
     want = np.linalg.solve(matrix, -freedom.adjoint(gradient))
     assert np.linalg.norm(wide @ (found - want)) < 0.05 * np.linalg.norm(wide @ want)
-
-
-def test_outlines_follow_their_places() -> None:
-    """Without a render, nearly as far as with one."""
-    made = logo()
-    fit = OutlineFit(render(made.scene), moved(made, (0.2, 0.1)), Run(Backend.on("cpu", 1)))
-    samples = fit.places()
-    before = errors(samples, fit.drawing.cubics()).sum()
-    every = np.arange(len(fit.drawing.scene.starts) - 1)
-    after = fitted(samples, fit.drawing, fit.least, every)
-    assert after[2].sum() < 0.1 * before
-    again = OutlineFit(render(made.scene), after[0], Run(Backend.on("cpu", 1)))
-    assert again.error < 0.15 * fit.error
-
-
-def test_each_cubic_has_the_pixels_around_it() -> None:
-    """A level line of 20 px with a pixel on each side, cut off at the border of the image."""
-    line = np.array([[(10, 20.5), (16, 20.5), (23, 20.5), (30, 20.5)], [(60, 20.5)] * 4], float)
-    cubic, pixel = pixels_around(line, 64, 48)
-    assert np.bincount(cubic).tolist() == [3 * 22, 9]
-    assert sorted(set((pixel[cubic == 0] // 64).tolist())) == [19, 20, 21]

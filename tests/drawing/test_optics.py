@@ -1,19 +1,23 @@
-"""How a picture was made is found and undone."""
+"""How a picture was made, enlarged and coloured is found and undone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
 import warpsplat
-from tests.drawing.trace.drawings import draw
-from warpsplat import metrics
+from tests.drawing.trace.drawings import decibels, draw
 from warpsplat.drawing.constraints import DRAFT_GRID
-from warpsplat.drawing.edges import LINEAR, MIDDLES
-from warpsplat.drawing.optics import COUNTS, NONE, RADIUS, RINGS, SCALE, Seen
+from warpsplat.drawing.edges import LINEAR, MIDDLES, find_edges
+from warpsplat.drawing.optics import NONE, SCALE, Seen
+from warpsplat.drawing.picture import Picture
+from warpsplat.drawing.reduced import before_enlarging
+from warpsplat.drawing.seen_colors import MOST_COLORS, with_seen_colors
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.drawing.without_optics import without_optics
 from warpsplat.fit.export import finished, shown_image
@@ -39,15 +43,9 @@ def small(how: Image.Resampling, times: int = 1) -> Image.Image:
     return enlarged(BIG).resize((times * SIDE, times * SIDE), how)
 
 
-def light(times: int = 1) -> FloatArray:
-    """The drawing in linear light [levels]."""
-    step = BIG // times
-    parts = LINEAR[np.asarray(enlarged(BIG))].reshape(times * SIDE, step, times * SIDE, step, 3)
-    return np.asarray(parts.mean(axis=(1, 3)), np.float32)
-
-
 def in_linear_light() -> Image.Image:
-    return Image.fromarray(np.searchsorted(MIDDLES, light()).astype(np.uint8))
+    light = LINEAR[np.asarray(enlarged(BIG))].reshape(SIDE, BIG, SIDE, BIG, 3).mean(axis=(1, 3))
+    return Image.fromarray(np.searchsorted(MIDDLES, light.astype(np.float32)).astype(np.uint8))
 
 
 BOX = Image.Resampling.BOX
@@ -65,10 +63,6 @@ def pixels(image: Image.Image) -> FloatArray:
     return np.asarray(image, np.float32) / np.float32(255)
 
 
-def psnr(a: FloatArray, b: FloatArray) -> float:
-    return metrics.psnr(255 * a, 255 * b)
-
-
 def drawn(image: FloatArray, times: int = 1, **given: str) -> FloatArray:
     """A drawing of an image as a viewer shows it."""
     svg = warpsplat.vectorize(image, subject="drawing", **given).svg
@@ -79,87 +73,145 @@ def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
 
-def untouched(image: FloatArray, over: Callable[[], bool] = lambda: False) -> tuple[FloatArray, int]:
-    """An image without its optics, and how often it was traced."""
-    times = 0
-
-    def traced(each: FloatArray) -> Traced:
-        nonlocal times
-        times += 1
-        return trace(each)
-
-    result, _ = without_optics(image, None, traced, show, over)
-    return result, times
-
-
-def test_the_samples_of_a_kernel_are_those_of_a_square() -> None:
-    assert sum(COUNTS) == (2 * RADIUS) ** 2
-    assert len(set(RINGS)) == len(RINGS)
-
-
-@pytest.mark.parametrize("how", MADE)
-def test_a_sharp_image_tells_how_a_picture_was_made(how: str) -> None:
-    """Through the optics it is the picture, which without them is what means of pixels would be."""
-    picture, fine = pixels(MADE[how]()), pixels(small(BOX, SCALE))
-    seen = Seen.of(picture)
-    found = seen.find(fine, light(SCALE) / np.float32(255) if seen.edges.is_linear else None)
-    plain = pixels(small(BOX))
-    assert seen.edges.is_linear == (how == "in linear light")
-    assert psnr(found.shown, picture) > psnr(plain, picture) + 8
-    assert psnr(found.undone, plain) > psnr(picture, plain) + 8
-    assert found.error < found.without / 5
-
-
-def test_means_of_pixels_have_no_optics() -> None:
+def test_plain_and_unsmoothed_images_have_no_kernel() -> None:
+    """Any kernel that sharpens would explain steps."""
     found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))
     np.testing.assert_allclose(found.kernel, NONE, atol=2e-3)
-
-
-@pytest.mark.parametrize("color", [(0.3, 0.3, 0.3), (1, 1, 1)])
-def test_an_image_without_edges_tells_nothing(color: tuple[float, ...]) -> None:
-    flat = np.full((20, 30, 3), color, np.float32)
-    found = Seen.of(flat).find(np.full((40, 60, 3), color, np.float32))
-    assert found.kernel == NONE and found.error == found.without == 0
-    np.testing.assert_allclose(found.undone, flat, atol=0.003)
-
-
-def test_steps_of_pixels_tell_nothing() -> None:
-    """Any kernel that sharpens would explain them."""
     ink = np.where(np.asarray(small(BOX).convert("L")) < 128, 0, 255)
     image = np.repeat(ink[..., None], 3, axis=2).astype(np.float32) / 255
     assert Seen.of(image).find(pixels(small(BOX, SCALE))).kernel == NONE
 
 
-def test_colours_stay_below_opacity() -> None:
-    planes = [pixels(small(BOX, SCALE)) * 0.5, np.full((SCALE * SIDE, SCALE * SIDE, 1), 0.5, np.float32)]
-    fine = np.concatenate(planes, axis=2)
-    half = [pixels(MADE["blurred"]()) * 0.5, np.full((SIDE, SIDE, 1), 0.5, np.float32)]
-    undone = Seen.of(np.concatenate(half, axis=2)).find(fine).undone
-    assert (undone[..., :3] <= undone[..., 3:]).all()
+@pytest.mark.parametrize(("how", "is_late"), [(None, False), ("blurred", True)])
+def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late: bool) -> None:
+    image, traced = pixels(MADE[how]() if how else small(BOX)), list[Traced]()
 
+    def once(each: FloatArray) -> Traced:
+        traced.append(trace(each))
+        return traced[-1]
 
-def test_an_image_that_is_as_it_was_drawn_stays() -> None:
-    image = pixels(small(BOX))
-    result, times = untouched(image)
-    assert result is image and times == 1
-
-
-def test_without_time_nothing_is_looked_for() -> None:
-    image = pixels(MADE["blurred"]())
-    result, times = untouched(image, lambda: True)
-    assert result is image and times == 1
+    result, _ = without_optics(image, None, once, show, lambda: is_late)
+    assert result is image and len(traced) == 1
 
 
 @pytest.mark.parametrize("how", MADE)
-def test_a_drawing_is_what_it_was_before(how: str) -> None:
+def test_drawings_are_nearer_to_their_source_with_optics(how: str) -> None:
     """It is nearer to the source, four times as large, than without its optics, and as small."""
     picture, source = pixels(MADE[how]()), pixels(enlarged(4))
     sharp, soft = (drawn(picture, 4, optics=optics) for optics in ("auto", "none"))
-    assert psnr(sharp, source) > psnr(soft, source) + 0.5
-    assert psnr(sharp, source) > 36
+    assert decibels(sharp, source) > decibels(soft, source) + 0.5
+    assert decibels(sharp, source) > 36
     assert len(warpsplat.vectorize(picture, subject="drawing").svg) < 1200
 
 
 def test_a_blurred_draft_is_drawn_sharp() -> None:
     picture, source = pixels(MADE["blurred"]()), pixels(small(BOX))
-    assert psnr(drawn(picture, quality="draft"), source) > psnr(picture, source) + 4
+    assert decibels(drawn(picture, quality="draft"), source) > decibels(picture, source) + 4
+
+
+@pytest.mark.parametrize("how", [None, *MADE])
+def test_ringing_and_linear_light_are_detected(how: str | None) -> None:
+    found = find_edges(np.asarray(MADE[how]() if how else small(BOX), np.float32))
+    assert found.clean.sum() > 300
+    if how != "by Lanczos":  # which leaves several rings, the outermost of which are faint
+        assert found.has_rings == (how in ("sharpened", "by bicubic"))
+    assert found.is_linear == (how == "in linear light")
+
+
+def test_outlines_are_no_rings() -> None:
+    """A dark outline around a paler shape is as clean as a ring, but much darker."""
+    image = np.full((40, 40, 3), 250, np.float32)
+    image[8:32, 8:32] = (20, 20, 90)
+    image[10:30, 10:30] = (90, 120, 200)
+    found = find_edges(image)
+    assert not found.has_rings
+    np.testing.assert_array_equal(found.plain, image)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 3), (3, 2), (1, 40), (3, 50)])
+def test_small_images_have_no_edges_and_were_not_enlarged(shape: tuple[int, int]) -> None:
+    for planes in (3, 4):
+        image = np.zeros((*shape, planes), np.float32)
+        image[-1:, -1:] = 200
+        found = find_edges(image)
+        np.testing.assert_array_equal(found.plain, image)
+        assert not found.has_rings and not found.is_linear
+    before = before_enlarging(np.full((*shape, 3), 90, np.float32))
+    assert before is None or (before == 90).all()
+
+
+def floats(image: Image.Image) -> FloatArray:
+    return np.asarray(image, np.float32)
+
+
+@pytest.mark.parametrize("size", [(120, 120), (144, 144), (201, 200), (230, 230), (301, 300)])
+@pytest.mark.parametrize("by", ["Pillow", "OpenCV"])
+def test_images_enlarged_by_any_factor_are_restored(size: tuple[int, int], by: str) -> None:
+    was = small(BOX)
+    large = was.resize(size, Image.Resampling.BILINEAR)
+    if by == "OpenCV":
+        large = Image.fromarray(cv2.resize(np.asarray(was), size, interpolation=cv2.INTER_LINEAR))
+    found = before_enlarging(floats(large))
+    assert found is not None and found.shape == (SIDE, SIDE, 3)
+    assert np.abs(found - floats(was)).mean() < 0.5
+
+
+def test_other_images_are_not_taken_for_enlarged() -> None:
+    """Nor does what is smooth, or has edges along the axes only: a mixed pixel between flat ones lies alone
+    between two of nearly any smaller image."""
+    others = (Image.Resampling.BICUBIC, Image.Resampling.LANCZOS, Image.Resampling.NEAREST)
+    images = [*(small(BOX).resize((150, 150), how) for how in others), small(BOX), enlarged(2)]
+    images.append(small(BOX).filter(ImageFilter.GaussianBlur(2.5)))
+    box = np.full((90, 120, 3), 250, np.float32)
+    box[20:70, 30:80] = (40, 90, 160)
+    box[20:70, 29], box[20:70, 80], box[19, 30:80], box[70, 30:80] = 180, 100, 230, 130
+    for image in (*map(floats, images), box):
+        assert before_enlarging(image) is None
+
+
+def test_a_drawing_is_as_large_as_the_image_and_as_sharp_as_before() -> None:
+    picture = pixels(small(BOX).resize((151, 150), Image.Resampling.BILINEAR))
+    assert Picture.of(picture).pixels.shape[0] < 120
+    made = warpsplat.vectorize(picture, subject="drawing")
+    assert (made.scene.canvas.width, made.scene.canvas.height) == (151, 150)
+    shown = (
+        np.asarray(on_white(render_svg(made.svg, zoom=4).resize((4 * SIDE, 4 * SIDE), BOX)), np.float32) / 255
+    )
+    assert decibels(shown, pixels(enlarged(4))) > 38
+    assert len(made.svg) < 800
+    assert made.optics and made.optics.psnr > made.score.psnr  # type: ignore[union-attr]
+
+
+INK = (61, 31, 54)
+RAMP = '<linearGradient id="g"><stop stop-color="#fd0"/><stop offset="1" stop-color="#06c"/></linearGradient>'
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="{0}" height="{0}" viewBox="0 0 96 96">'
+    '<rect width="96" height="96" fill="#fff"/><circle cx="30" cy="34" r="22" fill="#a23b72"/>'
+    '<path d="M58 12l2-.5 20 76-2 .5zM12 70l60-8 .3 2-60 8z" fill="#3d1f36"/></svg>'
+)
+
+
+@pytest.mark.parametrize(("is_wrong", "is_shaded"), [(True, False), (False, False), (False, True)])
+def test_colors_of_thin_lines_are_recovered(is_wrong: bool, is_shaded: bool) -> None:
+    """Through the optics of a sharpened picture. A gradient stays and counts."""
+    svg = SVG.replace("<rect", RAMP + "<rect").replace("#a23b72", "url(#g)") if is_shaded else SVG
+    big = Image.fromarray(np.asarray(on_white(render_svg(svg.format(768)))).astype(np.uint8))
+    made = big.resize((96, 96), BOX).filter(ImageFilter.UnsharpMask(1, 60 * (not is_shaded), 0))
+    seen, true = Seen.of(pixels(made)), warpsplat.load_svg(svg.format(96))
+    kernel = seen.find(*(show(each) for each in seen.scenes(true))).kernel
+    is_ink = (np.abs(255 * true.colors - INK) < 1).all(axis=1)
+    wrong = np.where(is_ink[:, None] & is_wrong, np.float32([0.15, 0, 0.12]), true.colors)
+    found = with_seen_colors(replace(true, colors=wrong), seen, kernel, show)
+    np.testing.assert_allclose(255 * found.colors, 255 * true.colors, atol=4)
+    np.testing.assert_array_equal(found.stop_colors, true.stop_colors)
+    np.testing.assert_array_equal(found.points, true.points)
+
+
+def test_many_colours_stay() -> None:
+    bars = "".join(
+        f'<path d="M{5 * i} 0h4v96h-4z" fill="rgb({15 * i},0,90)"/>' for i in range(MOST_COLORS + 1)
+    )
+    drawn = warpsplat.load_svg(f'<svg xmlns="http://www.w3.org/2000/svg" width="96" height="96">{bars}</svg>')
+    seen = Seen.of(draw(bars))
+    fine = np.zeros((SCALE * 96, SCALE * 96, 4), np.float32)
+    assert with_seen_colors(drawn, seen, seen.find(fine).kernel, lambda each: fine) is drawn

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import warpsplat
-from warpsplat.drawing.plain_ground import find_ground
 from warpsplat.drawing.silhouette import by_object
-from warpsplat.drawing.without_background import opacity_on_ground, without_ground
+from warpsplat.drawing.without_background import without_ground
 from warpsplat.errors import ImageError
 from warpsplat.portable.filters import gaussian_blur
 from warpsplat.scene import FloatArray
@@ -37,22 +36,7 @@ def photograph(noise: float = 2.0) -> FloatArray:
     return np.clip(image + grain, 0, 1).astype(np.float32)
 
 
-def test_light_and_shadow_are_ground() -> None:
-    found = find_ground(255 * photograph(), everywhere=True)
-    cover = shapes()
-    assert found.mask[cover == 0].mean() > 0.85, "all but what is beside edges"
-    assert not found.mask[cover == 1].any()
-    outside = find_ground(255 * photograph(), everywhere=False)
-    assert found.mask[36, 32]
-    assert not outside.mask[36, 32]
-
-
-def test_edges_are_where_objects_end() -> None:
-    found = opacity_on_ground(photograph(), everywhere=True)
-    assert np.abs(found - shapes()).mean() < 0.006
-
-
-def test_what_is_cut_out_has_its_own_colours() -> None:
+def test_edge_colors_do_not_contain_the_background() -> None:
     found = without_ground(photograph(0), everywhere=True)
     edge = (found[..., 3] > 0.2) & (found[..., 3] < 1)
     straight = found[edge][:, :3] / found[edge][:, 3:]
@@ -60,23 +44,22 @@ def test_what_is_cut_out_has_its_own_colours() -> None:
     assert np.abs(straight - np.array([0.25, 0.2, 0.2])).max() < 0.1
 
 
-def test_a_path_for_each_object() -> None:
-    result = warpsplat.vectorize(photograph(), subject="silhouette", device="cpu", dpi=25.4)
+@pytest.mark.parametrize("is_cut_out", [False, True])
+def test_a_path_for_each_object(is_cut_out: bool) -> None:
+    """Of a photograph, and of an image that is cut out already, as a draft."""
+    image, quality = photograph(), "draft" if is_cut_out else "balanced"
+    if is_cut_out:
+        image = np.concatenate([np.full_like(image, 0.5), shapes()[..., None]], axis=2)
+    result = warpsplat.vectorize(image, subject="silhouette", quality=quality, device="cpu", dpi=25.4)
     assert len(result.scene) == 2
     assert 'width="96mm"' in result.svg
     assert not result.scene.colors.any()
     shown = np.asarray(render_own(result.svg.replace("mm", "px")).convert("RGBA"))[..., 3] / 255
-    assert np.abs(shown - shapes()).mean() < 0.015
+    assert np.abs(shown - shapes()).mean() < (0.005 if is_cut_out else 0.015)
     counts = np.diff(np.searchsorted(result.scene.starts, result.scene.first))
     assert sorted(counts) == [1, 2], "the ring has its hole"
-
-
-def test_drafts_and_images_that_are_cut_out_already() -> None:
-    cover = shapes()[..., None]
-    image = np.concatenate([np.broadcast_to(np.float32(0.5), (HEIGHT, WIDTH, 3)), cover], axis=2)
-    result = warpsplat.vectorize(image, subject="silhouette", quality="draft", device="cpu")
-    shown = np.asarray(render_own(result.svg).convert("RGBA"))[..., 3] / 255
-    assert np.abs(shown - shapes()).mean() < 0.005
+    with pytest.raises(ImageError, match="nothing but plain ground"):
+        warpsplat.vectorize(np.full((40, 40, 3), 200, np.uint8), subject="silhouette")
 
 
 def test_objects_in_holes_of_others() -> None:
@@ -86,11 +69,6 @@ def test_objects_in_holes_of_others() -> None:
     scene = warpsplat.vectorize(cover, subject="silhouette", quality="draft", device="cpu").scene
     assert len(scene) == 2
     assert len(by_object(scene)) == 2
-
-
-def test_nothing_on_paper() -> None:
-    with pytest.raises(ImageError, match="nothing but plain ground"):
-        warpsplat.vectorize(np.full((40, 40, 3), 200, np.uint8), subject="silhouette")
 
 
 def test_large_photographs_keep_their_size() -> None:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import warpsplat
-from tests.drawing.trace.drawings import draw
+from tests.drawing.drawings import vectorized
+from tests.drawing.trace.drawings import draw, ground
 from tests.drawing.trace.line_art import drawn
-from tests.runs import scored, vectorize
+from tests.runs import scored
 from warpsplat.drawing.picture import LEAST_ORIGINAL_SIDE, Picture
 from warpsplat.drawing.trace.trace import trace
-from warpsplat.fit.settings import make_settings
+from warpsplat.fit.settings import Painting, make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_svg
@@ -31,14 +31,13 @@ def repeated(image: FloatArray, times: int) -> FloatArray:
     return np.repeat(np.repeat(image, times, axis=0), times, axis=1)
 
 
-def test_a_picture_of_repeated_pixels_is_traced_as_what_it_was(device: str) -> None:
+def test_repeated_pixels_are_reduced_before_tracing(device: str) -> None:
     """The large file shows what the small one does, without the steps of the pixels."""
     small = drawn(DRAWING, 100, 100)
-    settings = make_settings(subject="drawing")
-    large = vectorize(repeated(small, 3), settings, Backend.on(device))
+    large = vectorized(repeated(small, 3), device)
     assert {'width="300"', 'height="300"'} <= set(large.svg.partition(">")[0].split())
     assert (large.scene.canvas.width, large.scene.canvas.height) == (300, 300)
-    plain = vectorize(small, settings, Backend.on(device))
+    plain = vectorized(small, device)
     assert score_svg(large.svg, small, perceptual=False).psnr >= scored(plain).psnr - 0.5
     assert large.scene.points.shape == plain.scene.points.shape
 
@@ -58,9 +57,7 @@ def test_enlargement_leaves_a_picture_to_trace(side: int, times: int, found: int
 
 
 @pytest.mark.parametrize("given", [{"colors": 2}, {"palette": "#06c,#fc0"}])
-def test_what_is_translucent_leaves_no_opaque_paint_in_few_colours(
-    device: str, given: dict[str, object]
-) -> None:
+def test_translucent_paint_is_left_out_with_few_colors(device: str, given: dict[str, object]) -> None:
     """A soft shadow, as regions and as a ramp: what is less than half there is left out."""
     shadow = (
         '<linearGradient id="s"><stop stop-opacity=".5"/><stop offset="1" stop-opacity="0"/></linearGradient>'
@@ -70,7 +67,7 @@ def test_what_is_translucent_leaves_no_opaque_paint_in_few_colours(
     body += (
         '<rect x="6" y="6" width="26" height="42" fill="#06c"/><circle cx="18" cy="24" r="8" fill="#fc0"/>'
     )
-    result = vectorize(draw(body, 64, 64), make_settings(subject="drawing", **given), Backend.on(device))
+    result = vectorized(draw(body, 64, 64), device, **given)
     shown = np.asarray(render_svg(result.svg))
     assert shown[8:46, 8:30, 3].min() == 255, "what is opaque is there"
     assert shown[:, 36:, 3].max() == shown[51:, :, 3].max() == 0
@@ -97,3 +94,37 @@ def test_figures_are_of_the_file_that_is_delivered(
     data = output.read_bytes()
     assert (result.svg.encode(), scored(result).bytes) == (data, len(data))
     assert scored(result).gzip_bytes == len(gzip.compress(data, 9, mtime=0))
+
+
+SHADED = (
+    '<linearGradient id="a"><stop stop-color="#f40"/><stop offset="1" stop-color="#fd0"/></linearGradient>'
+    '<radialGradient id="b"><stop stop-color="#fff"/><stop offset="1" stop-color="#06c"/></radialGradient>'
+)
+IMAGE = np.round(
+    255
+    * draw(
+        f'{ground("#fff")}{SHADED}<rect x="6" y="6" width="84" height="36" fill="url(#a)"/>'
+        '<circle cx="48" cy="68" r="22" fill="url(#b)"/>'
+    )[..., :3]
+).astype(np.uint8)
+
+
+def made(paint: Painting | None) -> warpsplat.Result:
+    return warpsplat.vectorize(IMAGE, quality="draft", subject="drawing", paint=paint)
+
+
+@pytest.mark.parametrize(
+    ("paint", "kinds"),
+    [("flat", ()), ("linear", ("linear",)), ("radial", ("radial",)), ("auto", ("linear", "radial"))],
+)
+def test_only_allowed_gradients_are_used(paint: Painting, kinds: tuple[str, ...]) -> None:
+    result = made(paint)
+    assert not [note for note in result.notes if "paint" in note]
+    assert [kind for kind in ("linear", "radial") if f"<{kind}Gradient" in result.svg] == [*kinds]
+
+
+def test_shading_without_gradients_is_bands_and_gradients_are_usual() -> None:
+    flat, usual = made("flat"), made("auto")
+    assert len(flat.scene) > len(usual.scene)
+    assert flat.score and flat.score.psnr > 25
+    assert made(None).svg == usual.svg

@@ -235,9 +235,6 @@ class Driver:
     def wp_cuda_stream_is_blocking(self, handle: int) -> int:
         return int(self.stream(handle).blocking)
 
-    def wp_cuda_context_get_stream(self, context: int) -> int:
-        return self.current.get(context - CONTEXT, 0)
-
     def wp_cuda_context_set_stream(self, context: int, handle: int | None, sync: int) -> None:
         old = self.current.get(context - CONTEXT)
         self.current[context - CONTEXT] = handle or 0
@@ -322,11 +319,6 @@ class Driver:
                 self.machine.submit(stream, lambda: self.machine.region.fill(block, NEW))
             return block.address
 
-    def wp_alloc_device(self, context: int, size: int, tag: Any) -> int:
-        if options.pools:
-            return self.wp_alloc_device_async(context, size, CURRENT, tag)
-        return self.wp_alloc_device_default(context, size, tag)
-
     def free(self, address: int, finish: bool) -> None:
         """Free a block: ``cudaFree``, which waits (``finish``), or ``cudaFreeAsync`` on the legacy stream."""
         block = self.machine.region.blocks.get(address)
@@ -357,9 +349,6 @@ class Driver:
 
     def wp_free_device_default(self, context: int, address: int) -> None:
         self.free(address, finish=True)
-
-    def wp_free_device(self, context: int, address: int) -> None:
-        self.free(address, finish=not options.pools)
 
     def wp_alloc_pinned(self, size: int, tag: Any) -> int:
         return int(self.real.wp_alloc_host(size, None))

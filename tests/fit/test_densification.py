@@ -1,9 +1,10 @@
-"""Shapes and points that come and go between steps, and runs that end with a surplus of shapes."""
+"""Shapes that come and go between steps, and those whose numbers are not finite."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,69 +12,24 @@ import pytest
 
 import warpsplat
 from tests.fit.pictures import picture, step_for
-from tests.scenes import random_scene
-from warpsplat.fit.densification import densify, remove_surplus, replace_shapes
+from tests.scenes import random_scene, with_gradients
+from warpsplat.errors import UsageError
+from warpsplat.fit.densification import recover
 from warpsplat.fit.loop import fit
-from warpsplat.fit.place import grid_scene
 from warpsplat.fit.problem import Problem, Run
-from warpsplat.fit.schedule import mean_points_at
-from warpsplat.fit.settings import Density, Settings, make_settings
-from warpsplat.fit.simplify import MIN_SPLINE_POINTS
+from warpsplat.fit.progress import Progress
+from warpsplat.fit.settings import make_settings
 from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
+from warpsplat.rendering.program import Launch
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import Basis, Canvas, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Kind, Scene
+from warpsplat.svg.write import write_svg
 
 CURVES = 12
 USUAL = {"curves": CURVES, "iterations": 100, "seed": 1, "subject": "photo", "device": "cpu"}
 LATE = 62
 """Steps after which such runs have their whole surplus."""
-
-
-def grid_step(settings: Settings, count: int, device: str) -> Step:
-    """Return a step for new shapes on a grid."""
-    scene = grid_scene(settings, picture(), count, np.random.default_rng(0))
-    return step_for(scene, picture(), device, settings)
-
-
-def test_a_step_refuses_to_run_until_it_is_rebuilt(device: str) -> None:
-    """Its launches hold the addresses of arrays that are gone."""
-    settings = make_settings(curves=12, iterations=100)
-    step = grid_step(settings, 12, device)
-    step.advance()
-    replace_shapes(step, step.state.scene(), np.arange(6), step.state.scene().take(np.arange(0)), 12)
-    for refused in (step.advance, lambda: step.configure(settings), step.render, lambda: step.time(1)):
-        with pytest.raises(RuntimeError, match="recorded before"):
-            refused()
-    step.rebuild()
-    assert step.state.step == 1
-    step.advance()
-    assert step.state.step == 2
-    assert np.isfinite(step.psnr())
-
-
-def test_points_follow_the_schedule(device: str) -> None:
-    """The number of shapes and points is that of the schedule, and training goes on in between."""
-    density = Density(interval=4, stop=1.0, mean_points=8.0, grown=0.1, start=1.0)
-    settings = make_settings(curves=12, iterations=60, density=density)
-    scene = random_scene(Kind.FILL, 12, 64, 48, basis=Basis.SPLINE)
-    step = step_for(scene, picture(), device, settings)
-    state = step.state
-    while state.step < 56:
-        for _ in range(4):
-            step.advance()
-        densify(step, grows=True)
-        counts = state.scene().point_counts()
-        assert counts.min() >= MIN_SPLINE_POINTS
-        # New shapes come with all their points.
-        assert counts.mean() < mean_points_at(settings, state.step) + 2
-    assert len(counts) == 12
-    assert counts.mean() == pytest.approx(8, abs=0.5)
-    assert len(set(counts.tolist())) > 1
-    step.advance()
-    assert np.isfinite(step.psnr())
-    densify(step, grows=False)
-    assert len(state.scene()) == 12
 
 
 def after(count: int) -> Callable[[], bool]:
@@ -110,7 +66,7 @@ def test_a_run_that_is_stopped_has_the_shapes_asked_for(given: dict[str, Any], s
         assert len(np.unique(result.scene.colors, axis=0)) <= 4
 
 
-def test_figures_of_a_stopped_run_are_those_of_what_is_left(device: str) -> None:
+def test_figures_of_a_stopped_run_match_its_scene(device: str) -> None:
     target = picture()
     settings = make_settings(curves=CURVES, iterations=100, seed=1)
     made = fit(Problem(target, settings), Run(Backend.on(device), stop=after(LATE)), rounding=None)
@@ -119,27 +75,111 @@ def test_figures_of_a_stopped_run_are_those_of_what_is_left(device: str) -> None
     assert made.estimated_psnr == pytest.approx(made.render_psnr, abs=0.1)
 
 
-def discs(*each: tuple[float, float, float]) -> Scene:
-    """White opaque discs on black: x, y, radius."""
-    angles = np.arange(12) * np.pi / 6
-    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    points = np.stack([np.array([x, y]) + radius * ring for x, y, radius in each]).astype(np.float32)
-    canvas = Canvas(64, 48, np.zeros(3, np.float32))
-    white = np.ones((len(each), 3), np.float32)
-    return Scene.uniform(Kind.FILL, canvas, points, colors=white, opacities=np.ones(len(each), np.float32))
+SETTINGS = make_settings(curves=6, iterations=100)
+BROKEN = 2
+"""The shape whose numbers are spoiled."""
 
 
-@pytest.mark.parametrize(
-    ("scene", "base", "left"),
-    [
-        # Neither of the first two is missed while the other one is there.
-        (discs((16, 16, 12), (16, 16, 12), (44, 12, 3), (44, 36, 5)), 0, [1, 3]),
-        (discs((44, 12, 2), (16, 16, 12), (44, 36, 5)), 1, [0, 1]),
-    ],
-    ids=["hidden", "earlier level"],
-)
-def test_the_surplus_that_is_removed(device: str, scene: Scene, base: int, left: list[int]) -> None:
-    target, settings = render(scene, backend=Backend.on(device)), make_settings(curves=2, iterations=10)
-    step = step_for(scene, target, device, settings, base=base)
-    remove_surplus(step, 2)
-    np.testing.assert_array_equal(step.state.scene().points, scene.take(np.array(left)).points)
+def scene_of(what: str) -> Scene:
+    scene = random_scene(Kind.STROKE if what == "strokes" else Kind.FILL, 6, width=64, height=48, seed=3)
+    return with_gradients(scene) if what == "gradients" else scene
+
+
+def step_of(scene: Scene) -> Step:
+    """Return an advanced step of two threads, which is replayed launch by launch."""
+    step = step_for(scene, picture(), settings=SETTINGS, threads=2)
+    step.advance()
+    return step
+
+
+def poison(step: Step, name: str, where: str) -> None:
+    """Spoil one number of shape ``BROKEN``: now, or a gradient just before the next updates."""
+    group = step.state.parameters.groups[name]
+    row = int(np.flatnonzero(group.owner.numpy() == BROKEN)[0])
+    array = getattr(group, where)
+
+    def spoil() -> None:
+        values = array.numpy().copy()
+        values[row, 0] = np.nan if where != "moment2" else np.inf
+        array.assign(values)
+
+    if where == "grad":
+        step.programs[-1].launches.insert(0, Launch("update", "spoil", (spoil,)))
+    else:
+        spoil()
+
+
+def all_finite(step: Step) -> bool:
+    parameters = step.state.parameters
+    return not parameters.invalid().any() and bool(np.isfinite(step.renderer.read_image()).all())
+
+
+CASES = [
+    *(("fills", name) for name in ("points", "colors", "opacities")),
+    *(("strokes", name) for name in ("points", "widths", "colors")),
+    *(("gradients", name) for name in ("points", "frames", "stop_colors")),
+]
+
+
+@pytest.mark.parametrize("where", ["value", "moment1", "moment2", "grad"])
+@pytest.mark.parametrize(("what", "name"), CASES)
+def test_a_spoiled_shape_is_reset(what: str, name: str, where: str) -> None:
+    first = scene_of(what)
+    step = step_of(first)
+    poison(step, name, where)
+    step.advance()
+    recorded = step.renderer
+    recover(step, replaces=False)
+    assert step.renderer is recorded
+    assert step.state.renewed == 1
+    assert all_finite(step)
+    scene = step.state.scene()
+    for attribute in ATTRIBUTES:
+        rows = scene.rows(attribute, np.array([BROKEN]))
+        got, wanted = getattr(scene, attribute.name)[rows], getattr(first, attribute.name)[rows]
+        np.testing.assert_array_equal(got, wanted)
+    ages = step.state.parameters.arrays["ages"].numpy()
+    assert ages[BROKEN] == 0 and (np.delete(ages, BROKEN) == 2).all()
+    if where == "grad":
+        del step.programs[-1].launches[0]
+    step.advance()
+    recover(step, replaces=False)
+    assert step.renderer is recorded and step.state.renewed == 1, "it is over"
+    assert all_finite(step)
+
+
+def test_twins_are_reset_together() -> None:
+    fill = random_scene(Kind.FILL, 2, width=64, height=48, seed=5)
+    stroke = replace(fill, kind=np.ones(2, np.int32), widths=np.full(2, 3, np.float32))
+    scene = fill.append(stroke).take(np.array([0, 2, 1, 3]))
+    step = step_of(replace(scene, twin=np.array([0, 1, 0, 1], np.int32)))
+    poison(step, "points", "value")
+    step.advance()
+    recover(step, replaces=False)
+    assert step.state.renewed == 2
+    made = step.state.scene()
+    np.testing.assert_array_equal(made.points_of(2), made.points_of(3))
+
+
+@pytest.mark.parametrize("at", [10, 60, 90, 100])
+def test_a_run_survives_and_counts(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the number of shapes grows, while coordinates are rounded, and at the last step."""
+    advance = Step.advance
+    image = picture()
+
+    def spoiled(self: Step) -> None:
+        advance(self)
+        if self.state.step == at:
+            poison(self, "colors", "value")
+
+    monkeypatch.setattr(Step, "advance", spoiled)
+    told: list[Progress] = []
+    made = fit(Problem(image, replace(SETTINGS, curves=9)), Run(Backend.on("cpu", 1), told.append))
+    assert made.renewed == 1
+    assert np.isfinite([made.render_psnr, made.estimated_psnr]).all()
+    assert write_svg(made.scene, per_pixel=made.per_pixel)
+    for name in ("points", "colors", "opacities"):
+        values = getattr(made.scene, name).copy()
+        values[-1] = np.inf
+        with pytest.raises(UsageError, match=rf"shape \d: {name} with a number that is not finite"):
+            write_svg(replace(made.scene, **{name: values}))

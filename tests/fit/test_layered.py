@@ -41,7 +41,7 @@ def gradients_of(scene: Scene, device: str, **given: object) -> dict[str, FloatA
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.7])
-def test_the_gradient_is_that_of_all_pictures(device: str, weight: float) -> None:
+def test_the_gradient_is_the_sum_over_levels(device: str, weight: float) -> None:
     """Of the whole and, weighted, of each earlier level, rendered by themselves."""
     scene = mixed_scene(64, 48, seed=3)
     ends = (2, 5)

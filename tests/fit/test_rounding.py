@@ -1,122 +1,34 @@
-"""Rounding in stages: what is frozen at each, which grid is taken, and what a run ends with."""
+"""Rounding in stages, and outlines drawn back from what is empty."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
 
 from tests.fit.pictures import picture, step_for
-from tests.scenes import CURVES, mixed_scene, random_scene, started_alike
+from tests.scenes import CURVES, disc, mixed_scene, random_scene, started_alike
 from warpsplat.fit import rounding
+from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.rounding import (
-    STAGES,
     choose_grid,
-    freeze_opacities,
-    freeze_stage,
-    opacities_at,
-    stage_at,
 )
 from warpsplat.fit.settings import make_settings
-from warpsplat.fit.step import Step
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import ExactModel
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import OPACITY_RANGE, Basis, FloatArray, Kind, Scene
+from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, Kind, Scene
 from warpsplat.svg.read import load_scene
+from warpsplat.svg.viewer import premultiplied, render_own
 from warpsplat.svg.write import GRIDS, rounded
 
-SETTINGS = make_settings(iterations=100)
+SETTINGS = make_settings()
 OPAQUE = np.float32(OPACITY_RANGE[1])
-
-
-def advanced(step: Step) -> Scene:
-    """Do a few steps and return the scene."""
-    for _ in range(3):
-        step.advance()
-    return step.state.scene()
-
-
-def step_of(scene: Scene, device: str, image: FloatArray | None = None) -> Step:
-    """After a few steps."""
-    step = step_for(scene, picture() if image is None else image, device, SETTINGS)
-    advanced(step)
-    return step
-
-
-@pytest.mark.parametrize("quality", ["draft", "balanced"])
-@pytest.mark.parametrize("iterations", [4, 7, 60, 1000, 2000])
-def test_when_stages_and_opacities_are_due(iterations: int, quality: Literal["draft", "balanced"]) -> None:
-    settings = make_settings(quality, iterations=iterations)
-    found = {step: stage_at(settings, step) for step in range(iterations)}
-    due = {step: stage for step, stage in found.items() if stage is not None}
-    assert list(due.values()) == list(range(1, STAGES + 1))
-    gaps = np.diff([*due, iterations])
-    assert (gaps == gaps[0]).all(), "as many steps after each"
-    at = opacities_at(settings)
-    assert 0 < at <= min(due)
-    if iterations >= 60:
-        assert at > max(settings.density.stop, settings.coarse) * iterations
-
-
-@pytest.mark.parametrize("stage", range(1, STAGES + 1))
-def test_a_stage_rounds_and_freezes_its_share(device: str, stage: int) -> None:
-    """The points 0, 3, 6 ... of each shape, then those after them, then those before; all widths at once."""
-    step = step_of(mixed_scene(64, 48), device)
-    state = step.state
-    state.grid = 2.0
-    before = state.scene()
-    low = rounded(before, 2.0)
-    freeze_stage(step, stage)
-    after = state.scene()
-    number = np.concatenate([np.arange(n) for n in before.point_counts()])
-    frozen = number % 3 < stage
-    np.testing.assert_array_equal(after.points, np.where(frozen[:, None], low.points, before.points))
-    np.testing.assert_array_equal(after.widths, low.widths)
-    assert (after.widths != before.widths).any()
-    for name in ("opacities", "colors"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
-    moved = advanced(step)
-    np.testing.assert_array_equal(moved.points[frozen], after.points[frozen])
-    assert frozen.all() or (moved.points[~frozen] != after.points[~frozen]).any(axis=1).mean() > 0.8
-    np.testing.assert_array_equal(moved.widths, after.widths)
-    assert (moved.opacities != after.opacities).any()
-    assert (moved.colors != after.colors).any()
-
-
-def opacity_step(device: str) -> Step:
-    """Return a step whose image shows all shapes but one."""
-    scene = mixed_scene(64, 48)
-    hidden = random_scene(Kind.FILL, 1, 64, 48, seed=9)
-    hidden = replace(hidden, points=hidden.points - np.float32(1000))
-    image = render(scene, backend=Backend.on(device))
-    noise = np.random.default_rng(0).normal(0, 0.02, image.shape)
-    return step_of(scene.append(hidden), device, (image + noise).astype(np.float32))
-
-
-def test_opacities_are_frozen_at_tenths_or_opaque(device: str) -> None:
-    step = opacity_step(device)
-    before = step.state.scene()
-    before.opacities[:4] = [0.02, 0.051, 0.149, 0.5]
-    step.state.parameters.assign(before)
-    freeze_opacities(step)
-    after = step.state.scene()
-    opaque = after.opacities == OPAQUE
-    assert opaque[-1], "nobody sees it: it is worth no byte"
-    assert not opaque.all(), "others are"
-    wanted = np.clip(np.round(before.opacities[~opaque].astype(np.float64), 1), 0.1, OPACITY_RANGE[1])
-    np.testing.assert_array_equal(after.opacities[~opaque], wanted.astype(np.float32))
-    for name in ("points", "colors", "widths"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
-    moved = advanced(step)
-    np.testing.assert_array_equal(moved.opacities, after.opacities)
-    assert (moved.colors != after.colors).any()
-    assert (moved.points != after.points).any()
 
 
 @pytest.mark.parametrize("staged", [True, False])
@@ -129,7 +41,9 @@ def test_the_coarsest_grid_within_the_loss(
     start = mixed_scene(64, 48, seed=1)
     noise = np.random.default_rng(0).normal(0, 0.1, (48, 64, 3))
     image = (render(start, backend=Backend.on(device)) + noise).astype(np.float32)
-    step = step_of(start, device, image)
+    step = step_for(start, image, device, make_settings(iterations=100))
+    for _ in range(3):
+        step.advance()
     scene = step.state.scene()
     grid = choose_grid(step, staged=staged)
 
@@ -148,7 +62,7 @@ def test_the_coarsest_grid_within_the_loss(
 
 @pytest.mark.parametrize("kind", list(Kind))
 @pytest.mark.parametrize("basis", CURVES)
-def test_a_run_ends_with_what_the_file_has(device: str, kind: Kind, basis: Basis) -> None:
+def test_the_final_scene_equals_the_file(device: str, kind: Kind, basis: Basis) -> None:
     settings = make_settings(kind=kind, basis=basis, curves=10, iterations=60)
     made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     held = rounded(made.scene, made.per_pixel)
@@ -172,3 +86,26 @@ def test_runs_of_few_steps_keep_to_the_precision(device: str, iterations: int, p
     settings = make_settings(curves=6, iterations=iterations, precision=precision)
     made = fit(Problem(picture(), settings), Run(Backend.on(device)))
     assert made.per_pixel <= 10**precision
+
+
+def shown(scene: Scene) -> np.ndarray:
+    return premultiplied(render_own(export(scene, SETTINGS, 10.0))) / 255
+
+
+def test_outlines_are_drawn_back_no_further_than_needed(device: str) -> None:
+    scene = replace(disc(12, 40, 20), canvas=Canvas(40, 40, None))
+    target = shown(replace(scene, points=20 + (scene.points - 20) * np.float32(11.3 / 12)))
+    empty = target[..., 3] == 0
+    assert shown(scene)[empty].any()
+    cleared = clear_empty(scene, target, SETTINGS, Run(Backend.on(device)), 10.0)
+    assert not shown(cleared)[empty].any()
+    assert np.abs(cleared.points - scene.points).max() < 1.5
+    late = Run(Backend.on(device), deadline=-math.inf)
+    assert clear_empty(scene, target, SETTINGS, late, 10.0) is scene
+
+
+def test_a_clear_scene_stays_as_it_is(device: str) -> None:
+    scene = random_scene(Kind.FILL, 5, basis=Basis.SPLINE)
+    scene = replace(scene, canvas=Canvas(40, 36, None))
+    cleared = clear_empty(scene, shown(scene), SETTINGS, Run(Backend.on(device)), 10.0)
+    np.testing.assert_array_equal(cleared.points, rounded(scene, 10.0).points)

@@ -11,8 +11,8 @@ import pytest
 import warp as wp
 
 import warpsplat
-from tests.fit.pictures import picture, step_for
-from tests.scenes import FORMS, forms_scene, mixed_scene, random_scene, with_gradients
+from tests.fit.pictures import picture
+from tests.scenes import FORMS, forms_scene, random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.settings import make_settings
 from warpsplat.forms import form_of
@@ -65,25 +65,6 @@ def test_control_points_and_adjoint(which: int, device: str) -> None:
     found = parameters.gradients()["points"]
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(expected).max() > 0.1
-
-
-def test_curves_launch_nothing_more(device: str) -> None:
-    step = step_for(mixed_scene(64, 48), PICTURE, device)
-    names = {launch.name for program in step.programs for launch in program.launches}
-    assert not {name for name in names if name.startswith(("place", "gather"))}
-
-
-def test_losses_of_curves_count_beside_forms(device: str) -> None:
-    """They move curves as Adam sees them; forms are moved by the image alone."""
-    curves, forms = mixed_scene(64, 48), forms_scene(64, 48)
-    gradients = []
-    for bending in (0.0, 0.1):
-        settings = make_settings(iterations=50, bending=bending)
-        step = step_for(curves.append(forms), PICTURE, device, settings)
-        step.advance()
-        gradients.append(step.state.parameters.gradients()["points"])
-    differ = (gradients[0] != gradients[1]).any(axis=1)
-    assert differ[: len(curves.points)].mean() > 0.9
 
 
 @pytest.mark.parametrize("which", range(len(FORMS)))
@@ -188,13 +169,6 @@ def test_refining_a_file_of_curves_and_forms() -> None:
     result = warpsplat.refine(write_svg(moved), target, iterations=80, device="cpu", threads=1)
     assert result.before and result.score and result.score.psnr > result.before + 3
     assert result.svg.count("<path") == 2
-
-
-def test_few_shapes_are_fitted_to_fewer_pixels() -> None:
-    settings = [make_settings(shape="ellipse", curves=count) for count in (1, 50, 200)]
-    few, some, many = (each.fine_pixels for each in settings)
-    assert settings[0].coarse_pixels == few < some < many
-    assert make_settings(shape="ellipse", curves=1, fine_pixels=7_000_000).fine_pixels == 7_000_000
 
 
 @pytest.mark.parametrize(

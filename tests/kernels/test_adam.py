@@ -70,7 +70,7 @@ def test_keeps_bounds(device: str) -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("where", ["grad", "moment1", "moment2", "value"])
-def test_no_update_is_made_of_what_is_not_finite(device: str, where: str, bad: float) -> None:
+def test_numbers_that_are_not_finite_are_not_applied(device: str, where: str, bad: float) -> None:
     """Its shape is marked, and nothing else changes: neither the row's moments nor other shapes."""
     start = np.full((3, 2), 0.5, np.float32)
     s, other = (state(start, [0, 1, 1], [0, 0], device) for _ in range(2))

@@ -67,15 +67,3 @@ def test_a_kernel_that_spills_is_found() -> None:
 
 def test_atomic_sums_of_floats_are_found() -> None:
     assert ATOMIC_FLOATS.search(ptx_of(racing.adds_up.module).read_text())
-
-
-def test_exceptions_exist() -> None:
-    assert EXCEPTIONS.keys() <= {kernel.key for kernel in all_kernels(quad)}
-
-
-@pytest.mark.parametrize(
-    ("registers", "shared", "occupancy"),
-    [(32, 0, 1.0), (33, 0, 0.75), (128, 0, 0.25), (255, 0, 0.125), (32, 100 << 10, 0.25)],
-)
-def test_occupancy(registers: int, shared: int, occupancy: float) -> None:
-    assert Usage(registers, 0, 0, shared).occupancy(90, 256) == occupancy

@@ -30,7 +30,7 @@ def ranges_of(counts: list[int], device: str, *, reverse: bool = False) -> tuple
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_what_does_not_fit_is_left_out_whole_and_counted(device: str, reverse: bool) -> None:
+def test_ranges_beyond_the_capacity_are_left_out_and_counted(device: str, reverse: bool) -> None:
     ranges, needed = ranges_of([40, 0, 30, 31, 5], device, reverse=reverse)
     sizes = (ranges[:, 1] - ranges[:, 0])[:: -1 if reverse else 1]
     assert sizes.tolist() == [40, 0, 30, 0, 0]
@@ -55,7 +55,7 @@ def test_a_sum_beyond_32_bits_is_noticed(device: str, counts: list[int]) -> None
     assert (used >= 0).all() and (used <= CAPACITY).all(), "nothing is written outside of the arrays"
 
 
-def test_such_a_scene_is_refused_in_a_line(device: str) -> None:
+def test_a_scene_beyond_32_bits_is_refused(device: str) -> None:
     renderer = renderer_for(random_scene(Kind.FILL, 2), device)
     renderer.needed_slots.fill_(constants.INT_MAX)
     with pytest.raises(CapacityError, match=r"needs \d+ samples and over 2 billion tile slots") as caught:

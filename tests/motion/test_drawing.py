@@ -1,13 +1,19 @@
-"""The order of drawing, as frames and as style sheets."""
+"""The order of drawing, moving elements, and the tracking of shapes."""
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.scenes import forms_scene, mixed_scene, with_gradients
 from warpsplat.motion import drawing
+from warpsplat.motion.follow import track_shapes
+from warpsplat.motion.moving import moving_elements
+from warpsplat.scene import Basis, Scene
 from warpsplat.svg.viewer import on_white, render_own
 
 TWO_STROKES = (
@@ -62,9 +68,103 @@ def test_own_styles_and_classes_stay() -> None:
     assert np.array_equal(np.asarray(render_own(text)), np.asarray(render_own(other)))
 
 
-def test_lengths() -> None:
-    assert drawing.path_length("M0 0h30v40") == pytest.approx(70)
-    circle = "M10 0a10 10 0 1 1-20 0a10 10 0 1 1 20 0z"
-    assert drawing.path_length(circle) == pytest.approx(2 * np.pi * 10, rel=0.01)
-    assert drawing.path_length("M0 0h3M0 9h5") == pytest.approx(5), "dashes restart at each subpath"
-    assert drawing.path_length("") == 0
+SCENE = mixed_scene()
+LESS, MOVED = SCENE.take(np.arange(1, len(SCENE))), replace(SCENE, points=SCENE.points + np.float32(1))
+
+
+def made(*scenes: Scene) -> tuple[list[str], str]:
+    """Return lines of elements in 400 units, with keyframes a second apart, and the rules."""
+    static = "<static {}/>".format
+    text, rules = moving_elements(
+        scenes, range(len(scenes)), 1.0, 400.0, lambda scene: static(scene.opacities[0])
+    )
+    return text.splitlines(), rules
+
+
+def places(line: str, begin: int = 0) -> list[str]:
+    """Return the path data of a moving path by keyframe."""
+    found = re.search(rf'<animate attributeName="d" begin="{begin}s" [^>]*values="([^"]*)"', line)
+    assert found
+    return found[1].split(";")
+
+
+def commands(data: str) -> list[tuple[str, int]]:
+    rows = re.findall("([a-zA-Z])([^a-zA-Z]*)", data)
+    return [(letter, len(re.findall(r"-?\d+", row))) for letter, row in rows]
+
+
+def test_paths_move_with_equal_commands() -> None:
+    lines, _ = made(SCENE, MOVED, SCENE)
+    assert len(lines) == len(SCENE)
+    for line in lines:
+        first, second, third = places(line)
+        assert first == third != second and f'd="{third}"' in line
+        assert commands(first) == commands(second)
+        x, y, u, v = (int(n) for part in (first, second) for n in re.findall(r"-?\d+", part)[:2])
+        assert abs(u - x - 10) <= 2 and abs(v - y - 10) <= 2, "400 units on a canvas of 40"
+
+
+def test_forms_move_as_their_outlines() -> None:
+    scene = forms_scene()
+    lines, rules = made(scene, replace(scene, points=scene.points + np.float32(1)))
+    drawn = [each.drawn() for each in (scene, replace(scene, points=scene.points + np.float32(1)))]
+    assert (lines, rules) == made(*drawn)
+    assert all(len(set(places(line))) == 2 for line in lines)
+
+
+def test_shapes_fade_in_and_out() -> None:
+    lines, _ = made(LESS, SCENE, SCENE, LESS)
+    fading = [line for line in lines if "animation:" in line]
+    assert len(fading) == 1 and fading[0] is not lines[-1]
+    assert 'animation:i 1s linear 0s backwards,o 1s linear 2s forwards"' in fading[0]
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.9, 0.6])
+def test_an_opaque_element_stays_until_its_successor_is_there(opacity: float) -> None:
+    scene = with_gradients(SCENE)
+    ones = np.ones_like(scene.stop_opacities)
+    scene = replace(scene, opacities=np.full_like(scene.opacities, opacity), stop_opacities=ones)
+    lines, _ = made(scene, replace(scene, opacities=scene.opacities - np.float32(0.01)))
+    groups = [line for line in lines if "<static" in line]
+    number = int((scene.paint != 0).sum())
+    assert len(groups) == 2 * number
+    assert sum("animation:gi 1s linear 0s backwards" in line for line in groups) == number
+    goes = "go 0s linear 1s forwards" if opacity > 0.8 else "go 1s linear 0s forwards"
+    assert sum(goes in line for line in groups) == number
+
+
+def test_an_outline_that_loses_points_keeps_its_commands() -> None:
+    row = int(np.flatnonzero(SCENE.basis == Basis.SPLINE)[0])
+    keep = np.arange(len(SCENE.points)) != SCENE.first[row] + 1
+    lines, _ = made(SCENE, SCENE.without_points(keep))
+    assert len(lines) == len(SCENE)
+    first, second = places(lines[row])
+    assert commands(first) == commands(second) and first != second
+
+
+def later(scene: Scene, keep: list[int], new: Scene) -> Scene:
+    """Return the scene a densification and some steps later."""
+    moved = scene.take(np.array(keep))
+    points = moved.points + np.random.default_rng(0).normal(0, 0.3, moved.points.shape).astype(np.float32)
+    return replace(moved, points=points).append(new)
+
+
+def test_shapes_are_tracked_through_densification() -> None:
+    """Moved shapes keep their numbers, new ones get new numbers, and one order fits all scenes."""
+    first, other = mixed_scene(seed=1), mixed_scene(seed=2)
+    count = len(first)
+    second = later(first, [i for i in range(count) if i != 2], other.take(np.array([0])))
+    third = later(second, list(range(1, count)), other.take(np.array([3])))
+    numbers, order = track_shapes([first, second, third])
+    assert numbers[1].tolist() == [0, 1, *range(3, count), count]
+    assert numbers[2].tolist() == [1, *range(3, count), count, count + 1]
+    assert sorted(order) == list(range(count + 2))
+    assert all((np.diff([order.index(n) for n in row]) > 0).all() for row in numbers)
+
+
+def test_a_shape_that_changes_depth_is_another_one() -> None:
+    """Otherwise no order would fit both scenes."""
+    scene = mixed_scene()
+    numbers, order = track_shapes([scene, scene.take(np.roll(np.arange(len(scene)), 1))])
+    assert numbers[1].tolist() == [len(scene), *range(len(scene) - 1)]
+    assert order[0] == len(scene)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -115,19 +113,6 @@ def test_an_encoding_without_half_blocks(
     monkeypatch.setattr(preview, "HALF", "\udc80")
     assert run("vectorize", image, "-o", tmp_path / "a.svg", *QUICK, "--preview=blocks") == 0
     assert "has no half blocks" in one_line(capsys.readouterr().err)
-
-
-def test_notices_go_below_the_preview(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Messages that are overwritten leave no line."""
-    moved: list[preview.Preview] = []
-    monkeypatch.setattr(preview.Preview, "move_on", lambda self: moved.append(self))  # noqa: PLW0108
-    log = logging.getLogger("warpsplat")
-    for _ in range(2):  # a second preview replaces the first
-        made = preview.start_preview(sys.stderr, "blocks")
-        log.warning("a notice")
-        log.warning("compiling", extra={"passing": True})
-        assert moved == [made]
-        moved.clear()
 
 
 @pytest.mark.parametrize("terminal", [True, False])

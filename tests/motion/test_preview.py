@@ -1,7 +1,8 @@
-"""Live previews on a small emulated terminal."""
+"""Pictures in terminals: previews on a small emulated one, and their escape sequences."""
 
 from __future__ import annotations
 
+import base64
 import io
 import os
 import re
@@ -10,18 +11,17 @@ import struct
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.scenes import mixed_scene
 from warpsplat.fit.progress import Progress, Snapshot
 from warpsplat.motion import preview
+from warpsplat.motion.escapes import half_blocks, iterm, kitty
 from warpsplat.motion.preview import (
-    TIME_SHARE,
     Preview,
     Protocol,
     best_protocol,
     has_true_color,
-    picture_size,
-    resized,
     terminal_size,
 )
 from warpsplat.scene import FloatArray
@@ -150,34 +150,6 @@ def test_lines_below_the_picture_stay(screen: Screen) -> None:
     assert screen.text(ROWS) == "notice" and screen.text(ROWS + 1)[0] == "▀"
 
 
-def test_a_resized_terminal_gets_a_new_picture(screen: Screen, size: list[int]) -> None:
-    shown = Shown(screen)
-    shown.update(RED)
-    size[:] = 20, 10
-    shown.update(BLUE)
-    assert sum("255;0;0" in style for style in screen.pictures()) == ROWS
-    assert sum("0;0;255" in style for style in screen.pictures()) == 10 - 4
-    before = screen.pictures()
-    size[:] = 5, 2
-    shown.update(GREEN)
-    assert screen.pictures() == before, "too small for a picture"
-
-
-def test_drawing_takes_a_small_part_of_the_time() -> None:
-    """The interval depends on the last two costs; the first update and a single slow one do not count."""
-    shown, drawn = Shown(Tty()), []
-    costs = [2.0, 0.1, 0.1, 5.0, *[0.1] * 1000]
-    while shown.now < 300:
-        before = shown.now
-        shown.update(RED, 0.0, costs[len(drawn)])
-        if shown.now > before:
-            drawn.append(shown.now)
-        shown.now += 0.01
-    gaps = np.diff(drawn)
-    assert gaps[0] < 1.2 and gaps[[1, 3]] == pytest.approx(0.1 / TIME_SHARE, abs=0.05)
-    assert 90 < len(drawn) < 110
-
-
 def test_a_pipe_gets_the_finished_picture_only() -> None:
     out = io.StringIO()
     shown = Shown(out)
@@ -204,22 +176,6 @@ def test_pixel_protocols_draw_in_the_same_place(protocol: Protocol, end: str) ->
     if protocol == "kitty":
         numbers = re.findall(r"i=(\d+)", out.getvalue())
         assert len(numbers) == 2 and len(set(numbers)) == 1, "so the second replaces the first"
-
-
-@pytest.mark.parametrize(("width", "height"), [(300, 200), (20, 400), (4000, 10)])
-@pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (10, 8)])
-def test_pictures_fit_in_their_proportions(width: int, height: int, columns: int, lines: int) -> None:
-    size = picture_size(os.terminal_size((columns, lines)), width, height)
-    assert size and 1 <= size[0] < columns and 1 <= size[1] <= lines - 4
-    across, down = size[0], 2 * size[1]
-    zoom = min(across / width, down / height)
-    for side, drawn, unit in ((width, across, 1), (height, down, 2)):
-        assert abs(side * zoom - drawn) <= unit * (1 + side / min(width, height))
-
-
-def test_transparency_is_white() -> None:
-    image = np.full((4, 4, 4), (0, 0.25, 0, 0.5), np.float32)  # premultiplied
-    assert (resized(image, 4, 4) == (128, 191, 128)).all()
 
 
 @pytest.mark.parametrize(
@@ -253,3 +209,47 @@ def test_current_size() -> None:
             fcntl.ioctl(primary, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
             assert terminal_size(stream) == (columns, lines)
     assert terminal_size(io.StringIO()) == shutil.get_terminal_size()
+
+
+def picture(width: int, height: int) -> np.ndarray:
+    """Random colours of those that all terminals have."""
+    steps = np.array([0, 95, 135, 175, 215, 255], np.uint8)
+    return steps[np.random.default_rng(1).integers(0, 6, (height, width, 3))]
+
+
+@pytest.mark.parametrize("true_color", [True, False])
+def test_half_blocks(true_color: bool) -> None:
+    """The upper half of each has the colour of the text, the lower one that of the ground."""
+    image, steps = picture(30, 2), [0, 95, 135, 175, 215, 255]
+    (line,) = half_blocks(image, true_color=true_color)
+    assert line.count("▀") == 30 and line.endswith("▀\x1b[0m")
+    if true_color:
+        found = [[*map(int, color.split(";"))] for color in re.findall(r"[34]8;2;(\d+;\d+;\d+)", line)]
+    else:
+        codes = [int(code) - 16 for code in re.findall(r"[34]8;5;(\d+)", line)]
+        found = [[steps[code // place % 6] for place in (36, 6, 1)] for code in codes]
+    assert np.array_equal(found, image.transpose(1, 0, 2).reshape(-1, 3))
+    uniform = np.full((2, 50, 3), 200, np.uint8)
+    assert len(half_blocks(uniform, true_color=true_color)[0]) < 100, "a style only where it changes"
+
+
+def test_kitty() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (60, 50, 3)).astype(np.uint8)
+    text = kitty(image, 10, 4, 7)
+    found = re.findall(r"\x1b_G([^;]*);([^\x1b]*)\x1b\\", text)
+    assert len(found) > 2 and "".join(f"\x1b_G{keys};{data}\x1b\\" for keys, data in found) == text
+    assert found[0][0] == "a=T,f=100,i=7,p=1,c=10,r=4,C=1,q=2,m=1"
+    assert [keys for keys, _ in found[1:]] == ["m=1"] * (len(found) - 2) + ["m=0"]
+    assert all(len(data) == 4096 for _, data in found[:-1]) and len(found[-1][1]) <= 4096
+    packed = base64.b64decode("".join(data for _, data in found), validate=True)
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(packed))), image)
+
+
+def test_iterm() -> None:
+    image = picture(20, 10)
+    text = iterm(image, 4, 1)
+    found = re.fullmatch(r"\x1b\]1337;File=inline=1;size=(\d+);width=4;height=1;[^:]*:([^\x07]*)\x07", text)
+    assert found
+    packed = base64.b64decode(found[2], validate=True)
+    assert len(packed) == int(found[1])
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(packed))), image)

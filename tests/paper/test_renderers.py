@@ -12,40 +12,12 @@ from tests.fit.pictures import picture
 from tests.runs import vectorize
 from tests.scenes import random_scene
 from warpsplat.cli.run import summary
-from warpsplat.errors import UsageError
-from warpsplat.fit.settings import Settings, make_settings
+from warpsplat.fit.settings import make_settings
 from warpsplat.metrics import score_svg
-from warpsplat.paper.renderers import fold_weight
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.figures import render_figures
-from warpsplat.scene import Basis, Kind
+from warpsplat.scene import Kind
 from warpsplat.svg.write import write_svg
-
-
-def test_the_fold_weight_grows_geometrically() -> None:
-    settings = make_settings(iterations=100, fold_start=0.1, fold_end=10.0)
-    assert [fold_weight(settings, n) for n in (0, 50, 100)] == pytest.approx([0.1, 1.0, 10.0])
-
-
-def test_splats_get_fewer_iterations_unless_told() -> None:
-    assert make_settings(renderer="splat").iterations < make_settings().iterations
-    assert make_settings(renderer="splat", iterations=77).iterations == 77
-
-
-def test_soft_gaussians_are_trained_on_their_own_render() -> None:
-    settings = make_settings(renderer="gaussian")
-    assert (settings.basis, settings.order, settings.viewer) == (Basis.CUBIC, "area", False)
-    assert make_settings(renderer="gaussian", order="age").order == "age"
-
-
-def test_splats_and_splines_do_not_go_together() -> None:
-    with pytest.raises(UsageError, match="splat needs the basis cubic"):
-        make_settings(renderer="splat", basis="spline")
-
-
-def test_soft_gaussians_have_no_gradients() -> None:
-    with pytest.raises(UsageError, match="gaussian needs the paint flat"):
-        make_settings(renderer="gaussian", paint="auto")
 
 
 def test_paper_options_run(device: str) -> None:
@@ -100,12 +72,3 @@ def test_soft_gaussians_are_in_no_file(tmp_path: Path, capsys: pytest.CaptureFix
     assert run("render", svg, "-o", png, "--renderer", "gaussian") == 2
     assert "vectorize --renderer gaussian" in one_line(capsys.readouterr().err)
     assert not png.exists()
-
-
-def test_splined_steps_are_not_theirs() -> None:
-    assert make_settings(renderer="splat").rates == Settings().rates
-
-
-def test_mixed_shapes_are_refused() -> None:
-    with pytest.raises(UsageError, match="mixed and"):
-        make_settings(mixed=True, renderer="splat")

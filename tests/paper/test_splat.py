@@ -1,39 +1,42 @@
-"""Splats: image and adjoint against float64, coverage, tile lists against brute force; properties."""
+"""Splats: image and adjoint against float64, tile lists, the fold loss, and how rows are placed."""
 
 from __future__ import annotations
 
-import itertools
+import hashlib
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
+import warp as wp
 
 from tests.helpers import (
     SPLAT,
     adjoint,
     compare,
+    relative_error,
     renderer_for,
 )
-from tests.paper.helpers import grid_of
-from tests.scenes import canvas, disc, mixed_scene, random_scene
-from warpsplat.kernels.constants import TILE
+from tests.kernels.test_elementary import run
+from tests.paper.helpers import grid_of, plans_of
+from tests.paper.reference.grid import fold_area, grids
+from tests.reference.curves import tensors
+from tests.scenes import disc, mixed_scene, points_by_shape, random_scene, with_points
+from warpsplat.kernels import constants
 from warpsplat.metrics import psnr
-from warpsplat.paper.constants import PLATEAU
+from warpsplat.paper.constants import COUNT_MAX, PLATEAU
+from warpsplat.paper.kernels.strips import bounded_product, normal_quantile, normal_tail
 from warpsplat.paper.models import SplatModel
-from warpsplat.paper.split import subcurve
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import Basis, FloatArray, Kind, Scene
+from warpsplat.scene import Basis, Kind, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
 FILL, STROKE = Kind.FILL, Kind.STROKE
 CASES = [(FILL, n, 1.0) for n in (2, 4, 6)] + [(STROKE, n, 1.0) for n in (1, 2, 3, 4, 5)]
 CASES += [(FILL, 4, 0.6), (STROKE, 3, 1.7)]
-
-
-def splatted(scene: Scene, device: str) -> FloatArray:
-    return render(scene, model=SPLAT, backend=Backend.on(device))
 
 
 @pytest.mark.slow
@@ -68,92 +71,6 @@ def test_fills_without_two_chains_are_refused(device: str, message: str) -> None
         renderer_for(REFUSED[message], device, model=SPLAT)
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_tile_lists_match_brute_force(device: str, kind: Kind) -> None:
-    scene = random_scene(kind, count=12, width=75, height=50, seed=4)
-    renderer = renderer_for(scene, device, model=SPLAT)
-    bins, grid = renderer.bins.buffers, grid_of(renderer)
-    first, last = bins.tile_first.numpy(), bins.tile_last.numpy()
-    slots, shapes = bins.sort_slots.numpy(), bins.slot_shape.numpy()
-    mean, extent = grid.mean.numpy(), grid.extent.numpy()
-    g_first, g_last = grid.gaussian_first.numpy(), grid.gaussian_last.numpy()
-    for tile in range(renderer.viewport.tile_count):
-        listed = [int(shapes[s]) for s in slots[first[tile] : last[tile]]]
-        assert listed == sorted(listed, reverse=True), "front (the last row) first, each shape once"
-        ty, tx = divmod(tile, renderer.viewport.tiles_x)
-        wanted = []
-        for shape in range(len(scene)):
-            low = (mean - extent)[g_first[shape] : g_last[shape]].min(axis=0)
-            high = (mean + extent)[g_first[shape] : g_last[shape]].max(axis=0)
-            if (high >= [TILE * tx, TILE * ty]).all() and (low < [TILE * (tx + 1), TILE * (ty + 1)]).all():
-                wanted.append(shape)
-        assert listed == wanted[::-1]
-
-
-@pytest.mark.parametrize("radius", [4.0, 10.0, 25.0])
-def test_a_splatted_disc_covers_what_the_path_covers(device: str, radius: float) -> None:
-    size = int(2 * radius + 12)
-    image = splatted(disc(radius, size, size / 2 + 0.3), device)[..., 0]
-    centres = np.arange(size) + 0.5 - (size / 2 + 0.3)
-    distance = np.hypot(*np.meshgrid(centres, centres)) - radius
-    assert image.sum() == pytest.approx(np.pi * radius**2, rel=0.06)
-    assert image[distance < -1.5].min() > 0.95
-    assert image[distance > 1.5].max() < 0.1
-    assert image[np.abs(distance) < 0.2].mean() == pytest.approx(0.5, abs=0.12)
-
-
-def test_stroke_covers_caps_and_joins(device: str) -> None:
-    """A stroke that turns back at its joint: the round join is a half disc beyond the turning point."""
-    scene = random_scene(STROKE, count=1, width=60, height=40)
-    x = np.array([15, 22, 30, 40, 33, 26, 20, 22, 24, 26], np.float32)
-    points = np.stack([x, np.full(10, 20.0, np.float32)], axis=1)
-    one = replace(
-        scene,
-        points=points,
-        widths=np.array([12.0], np.float32),
-        colors=np.ones((1, 3), np.float32),
-        opacities=np.ones(1, np.float32),
-        canvas=replace(scene.canvas, background=np.zeros(3, np.float32)),
-    )
-    image = splatted(one, device)[..., 0]
-    assert image[20, 44] > 0.9, "join: 4 px beyond the joint at x = 40, inside the radius of 6"
-    assert image[20, 48] < 0.05
-    assert image[20, 11] > 0.9, "cap: 4 px beyond the start at x = 15"
-    assert image[20, 7] < 0.05
-
-
-def test_invisible_and_outside_shapes_change_nothing(device: str) -> None:
-    scene = random_scene(FILL, count=3)
-    clear = replace(scene, opacities=np.zeros_like(scene.opacities))
-    np.testing.assert_array_equal(
-        splatted(clear, device), np.broadcast_to(scene.canvas.background, (36, 40, 3))
-    )
-    away = replace(scene, points=scene.points + np.float32(500))
-    renderer = renderer_for(away, device, model=SPLAT)
-    assert renderer.needed_slots.numpy()[0] == 0
-    assert not any(g.any() for g in adjoint(renderer).values())
-
-
-@pytest.mark.parametrize("cuts", [(0.5,), (0.1, 0.15, 0.9), (0.01, 0.02, 0.03, 0.04), (0.2, 0.4, 0.6, 0.8)])
-def test_a_stroke_looks_the_same_of_any_number_of_cubics(device: str, cuts: tuple[float, ...]) -> None:
-    """One cubic cut into several, of equal and of unequal lengths."""
-    whole = np.array([[8, 50], [20, -10], [44, 80], [56, 10]], np.float64)
-    pieces = [subcurve(whole[None], a, b)[0] for a, b in itertools.pairwise((0.0, *cuts, 1.0))]
-    chain = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
-    pictures = []
-    for points in (whole, chain):
-        scene = Scene.uniform(
-            STROKE,
-            canvas(64, 64),
-            points[None].astype(np.float32),
-            colors=np.ones((1, 3), np.float32),
-            opacities=np.full(1, 0.9, np.float32),
-            widths=np.full(1, 6, np.float32),
-        )
-        pictures.append(splatted(scene, device))
-    assert np.abs(pictures[0] - pictures[1]).mean() < 3e-3
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("through_scales", [True, False])
 def test_mixed_scenes(device: str, seed: int, through_scales: bool) -> None:
@@ -167,3 +84,100 @@ def test_the_file_looks_as_the_render(device: str, kind: Kind) -> None:
     shown = on_white(render_svg(write_svg(scene, opacity_scale=PLATEAU)))
     mine = render(scene, model=SPLAT, backend=Backend.on(device)).astype(np.float64) * 255
     assert psnr(mine, shown) > 30
+
+
+def folded_scene() -> Scene:
+    """Random blobs, the side of each pushed in past the opposite one."""
+    scene = random_scene(Kind.FILL, seed=5)
+    points = points_by_shape(scene)
+    middle = points.mean(axis=1)
+    points[:, 2:4] = 2 * middle[:, None] - points[:, 2:4]
+    return replace(scene, points=with_points(scene, points))
+
+
+def test_gradient(device: str) -> None:
+    """Folded fills between strokes, which may fold."""
+    scene = folded_scene().append(random_scene(Kind.STROKE, 2)).append(folded_scene())
+    weight = 3.0
+    renderer = renderer_for(scene, device, model=SplatModel(fold=weight))
+    p = tensors(scene)
+    signs = grid_of(renderer).shape_sign.numpy()
+    assert not signs[scene.kind == Kind.STROKE].any()
+    areas = [
+        fold_area(grid, float(sign))
+        for grid, sign in zip(grids(scene, p, plans_of(renderer), 1.0), signs, strict=True)
+    ]
+    total = torch.stack(areas).sum()
+    assert float(total.detach()) > 10
+    (weight * total / (scene.canvas.width * scene.canvas.height)).backward()
+    assert p["points"].grad is not None
+    renderer.backward()
+    assert relative_error(renderer.parameters.gradients()["points"], p["points"].grad.numpy()) < 1e-4
+
+
+def test_orientation_does_not_matter_and_a_disc_has_no_fold(device: str) -> None:
+    scene = disc(12, 40, 20)
+    mirrored = replace(scene, points=np.ascontiguousarray(scene.points[..., ::-1]))
+    for s, sign in ((scene, 1.0), (mirrored, -1.0)):
+        renderer = renderer_for(s, device, model=SplatModel(fold=1.0))
+        assert grid_of(renderer).shape_sign.numpy()[0] == sign
+        renderer.backward()
+        assert not renderer.parameters.gradients()["points"].any()
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_degenerate_shapes_do_no_harm(device: str, kind: Kind) -> None:
+    """All points equal, two ends equal, straight lines: finite image, finite gradients."""
+    scene = random_scene(kind, count=3)
+    points = points_by_shape(scene)
+    points[0] = points[0, 0]
+    points[1, 1:4] = points[1, 0]
+    points[2, :, 1] = 7.0
+    broken = replace(scene, points=with_points(scene, points))
+    renderer = renderer_for(broken, device, model=SplatModel(fold=1.0))
+    assert np.isfinite(renderer.read_image()).all()
+    for name, gradient in adjoint(renderer, np.float32([1, -1, 0.5])).items():
+        assert np.isfinite(gradient).all(), name
+
+
+wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
+
+TAILS = (np.linspace(3e-4, 0.7, 500) ** 2).astype(np.float32)
+DEVIATIONS = np.linspace(0, 5.4, 1000).astype(np.float32)
+
+
+@wp.kernel
+def normal_tails(x: wp.array[wp.float32], out: wp.array[wp.float32]):  # type: ignore[no-untyped-def]
+    i = wp.tid()
+    out[i] = normal_tail(x[i])  # type: ignore[index]
+
+
+@wp.kernel
+def normal_quantiles(x: wp.array[wp.float32], out: wp.array[wp.float32]):  # type: ignore[no-untyped-def]
+    i = wp.tid()
+    out[i] = normal_quantile(x[i])  # type: ignore[index]
+
+
+def digest(values: np.ndarray) -> str:
+    return hashlib.sha256(values.astype("<f4").tobytes()).hexdigest()[:16]
+
+
+def test_the_normal_distribution() -> None:
+    made = run(normal_tails, DEVIATIONS, "cpu")
+    exact = np.array([0.5 * math.erfc(z / math.sqrt(2)) for z in DEVIATIONS.astype(np.float64)])
+    assert np.abs(made - exact).max() < 2e-7
+    assert np.abs(made / exact - 1).max() < 4e-6
+    assert (np.diff(made) <= 1e-7).all()
+    assert digest(made) == "37eedcb99077d630"
+
+
+def test_quantiles_are_the_inverse() -> None:
+    quantiles = run(normal_quantiles, TAILS, "cpu")
+    back = run(normal_tails, quantiles.astype(np.float32), "cpu")
+    assert np.abs(back / TAILS - 1).max() < 1e-5
+    assert digest(quantiles) == "88120ddf5e997572"
+
+
+def test_counts_do_not_wrap() -> None:
+    pairs = [(3, 4), (2**20, 2**20), (2**31 - 1, 2**31 - 1), (-(2**31), 5), (0, 9)]
+    assert [bounded_product(a, b) for a, b in pairs] == [12, COUNT_MAX, COUNT_MAX, 0, 0]

@@ -52,7 +52,7 @@ def test_blurred_as_by_opencv(name: str, border: filters.Border, sigma: float) -
     assert_near(filters.gaussian_blur(IMAGES[name], sigma, border), theirs)
 
 
-def test_a_blur_within_a_ring_leaves_out_what_is_far_and_has_the_same_bits() -> None:
+def test_a_masked_blur_skips_far_tiles_with_the_same_bits() -> None:
     image, ring = RANDOM.uniform(size=(250, 311, 4)).astype(np.float32), np.zeros((250, 311), np.bool_)
     ring[3:, :300] = True
     ring[9:240, 8:290] = False

@@ -116,11 +116,3 @@ def test_pinned_bits() -> None:
     ]
     digest = hashlib.sha256(b"".join(np.asarray(each, "<f8").tobytes() for each in made)).hexdigest()
     assert digest[:16] == "618441c4d25e3a8f"
-
-
-def test_interp_takes_values_of_several_columns() -> None:
-    places, x = np.array([0.0, 1.0, 1.0, 3.0]), np.array([-1.0, 0.25, 1.0, 2.5, 9.0])
-    values = np.array([[0.0, 5.0], [2.0, -1.0], [4.0, 0.5], [8.0, 3.0]])
-    expected = np.stack([interp(x, places, column) for column in values.T], axis=1)
-    assert np.array_equal(interp(x, places, values), expected)
-    assert np.array_equal(interp(x, places[:1], values[:1]), np.broadcast_to(values[0], (5, 2)))

@@ -99,7 +99,7 @@ CASES: dict[str, tuple[Callable[[], Shape], Callable[[], Points]]] = {
 @pytest.mark.parametrize("moved", [False, True])
 @pytest.mark.parametrize("filled", [False, True])
 @pytest.mark.parametrize("name", CASES)
-def test_distances_are_those_from_outlines_of_many_points(name: str, filled: bool, moved: bool) -> None:
+def test_distances_match_dense_polylines(name: str, filled: bool, moved: bool) -> None:
     shape, outline = CASES[name]
     matrix = MATRIX if moved else torch.eye(3)
     color = tensor(1, 0, 0, 1)
@@ -119,7 +119,7 @@ VARIED: dict[str, tuple[Tensor, Callable[[Tensor], Shape]]] = {
 
 
 @pytest.mark.parametrize("name", VARIED)
-def test_gradients_are_those_of_differences(name: str) -> None:
+def test_gradients_match_finite_differences(name: str) -> None:
     """Of shapes, transforms and positions, along a direction."""
     values, shape = VARIED[name]
     generator = torch.Generator().manual_seed(1)

@@ -55,16 +55,6 @@ def test_radius_has_a_gradient(kind: FilterType) -> None:
     assert float(gradient) == pytest.approx(float(wanted), rel=0.04)
 
 
-def test_background_is_filtered_too() -> None:
-    background = torch.zeros(SIZE, SIZE, 4)
-    background[..., 3] = 1
-    background[:, SIZE - 4 :] = 1
-    image = render(pydiffvg.PixelFilter(FilterType.tent, tensor(2.0)), background)
-    assert image[40, 0, 0] == 0
-    assert float(image[40, -1, 0]) == pytest.approx(1)
-    assert 0.02 < float(image[40, SIZE - 5, 0]) < 0.98
-
-
 def test_derivatives_of_pixels_add_up_to_those_of_shapes() -> None:
     center = tensor(22.1, 20.7).requires_grad_()
     shape = pydiffvg.Circle(tensor(13.3), center)

@@ -1,16 +1,24 @@
-"""The threads that compile."""
+"""Threads: those that compile, those that share launches, and forks."""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
+import numpy as np
 import pytest
+import warp as wp
 
-from warpsplat.rendering import compiler
+from tests.scenes import random_scene
+from warpsplat.rendering import compiler, helpers
+from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.compiler import compile_later, compiler_finished, wait_for
+from warpsplat.rendering.program import Launch, Program
+from warpsplat.rendering.renderer import render
+from warpsplat.scene import Kind
 
 
 def compile_now(work: Callable[[], object]) -> None:
@@ -18,27 +26,7 @@ def compile_now(work: Callable[[], object]) -> None:
     wait_for(partial(compile_later, lambda: work() and None))
 
 
-@pytest.fixture
-def cores(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A compiler of its own for a test, with so many cores."""
-    monkeypatch.setattr(compiler, "available_cores", lambda: request.param)
-    compiler._compiler.cache_clear()
-    yield request.param
-    compiler._compiler.cache_clear()
-
-
-@pytest.mark.parametrize("cores", [2], indirect=True)
-def test_modules_are_compiled_at_the_same_time(cores: int) -> None:
-    both = threading.Barrier(cores, timeout=20)
-
-    def work() -> None:
-        both.wait()
-
-    for future in [compile_later(work) for _ in range(cores)]:
-        future.result()
-
-
-def test_what_the_compiler_raises_is_raised_where_it_is_waited_for() -> None:
+def test_exceptions_in_builds_reach_the_caller() -> None:
     def fail() -> None:
         raise ValueError("no such kernel")
 
@@ -68,31 +56,68 @@ def test_an_interrupted_wait_leaves_the_compiler_at_work(monkeypatch: pytest.Mon
     assert done.is_set()
 
 
-@pytest.mark.parametrize("cores", [1], indirect=True)
-def test_at_the_end_only_what_has_begun_is_finished(cores: int) -> None:
+def test_pending_builds_are_cancelled_at_exit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a compiler of its own, which has one core."""
     begun, go_on = threading.Event(), threading.Event()
 
     def work() -> None:
         begun.set()
         go_on.wait()
 
-    first = compile_later(work)
-    second = compile_later(lambda: None)
+    monkeypatch.setattr(compiler, "available_cores", lambda: 1)
+    compiler._compiler.cache_clear()
+    first, second = compile_later(work), compile_later(lambda: None)
     begun.wait()
     assert not compiler_finished(0.01)
     assert second.cancelled()
     go_on.set()
     assert compiler_finished()
     assert first.result() is None
+    compiler._compiler.cache_clear()
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks")
+def test_without_threads_the_caller_does_all(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = random_scene(Kind.FILL, count=12, width=90, height=70)
+    expected = render(scene, backend=Backend.on(device, 1))
+
+    def refuse(*arguments: Any) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    helpers.helpers.cache_clear()
+    np.testing.assert_array_equal(render(scene, backend=Backend.on(device, 5)), expected)
+    helpers.helpers.cache_clear()
+
+
+def test_exceptions_in_helper_threads_reach_the_caller() -> None:
+    failing = Program(wp.get_device("cpu"), 2)
+    started = threading.Barrier(2, timeout=10)
+
+    def fail() -> None:
+        started.wait()
+        if threading.current_thread() is not threading.main_thread():
+            raise ValueError("no good")
+
+    failing.launches.append(Launch("", "fail", (fail, fail)))
+    with pytest.raises(ValueError, match="no good"):
+        failing.run()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_fork_has_a_compiler_of_its_own() -> None:
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    """A compiler and helpers: it would wait for ever for those that it does not have."""
+    scene = random_scene(Kind.FILL, count=12, width=90, height=70)
+    expected = render(scene, backend=Backend.on("cpu", 2))
     compile_now(lambda: None)
     child = os.fork()
     if child == 0:
         made: list[int] = []
         compile_now(lambda: made.append(1))
-        os._exit(made != [1])
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+        same = np.array_equal(render(scene, backend=Backend.on("cpu", 2)), expected)
+        os._exit(0 if same and made == [1] else 1)
+    alarm = threading.Timer(60, os.kill, (child, 9))
+    alarm.start()
+    status = os.waitpid(child, 0)[1]
+    alarm.cancel()
+    assert os.waitstatus_to_exitcode(status) == 0

@@ -1,19 +1,26 @@
-"""Devices that cannot be used are found when one is chosen, with what stands in the way and what to do."""
+"""Devices that cannot be used, and pictures that no memory holds, are refused before any allocation."""
 
 from __future__ import annotations
 
 import json
 import logging
 import os
+from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
+import warp as wp
 
+import warpsplat
 from tests import fake_cuda
-from warpsplat.errors import DeviceError, UsageError
-from warpsplat.rendering import cuda, device
+from tests.scenes import random_scene
+from warpsplat.errors import DeviceError, ResourceError, UsageError
+from warpsplat.rendering import backend, cuda, device, memory
+from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.device import choose_device, no_gpu, start_warp
+from warpsplat.rendering.memory import check_memory
+from warpsplat.scene import Kind
 
 CHOOSE = """
 import json, logging, sys
@@ -85,10 +92,10 @@ def test_hidden_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["doctor"]["status"] == "note"
 
 
+ERROR = "Warp CUDA error"
 NO_DRIVER: dict[str, Any] = {
     "driver_version": None,
-    "min_driver_version": (13, 0),
-    "toolkit_version": (13, 0),
+    **dict.fromkeys(("min_driver_version", "toolkit_version"), (13, 0)),
 }
 
 
@@ -97,21 +104,9 @@ NO_DRIVER: dict[str, Any] = {
     [
         (False, "", None, "this build of Warp has no CUDA", False),
         (True, "", "0", "there is no NVIDIA driver", False),
-        (
-            True,
-            "Warp CUDA error 803: unsupported combination (in function init)",
-            None,
-            "unsupported combi",
-            True,
-        ),
-        (
-            True,
-            "Warp CUDA error 100: no CUDA-capable device is detected",
-            "",
-            "is '', which hides all GPUs",
-            False,
-        ),
-        (True, "Warp CUDA error 100: no CUDA-capable device is detected", None, "finds no GPU", False),
+        (True, f"{ERROR} 803: unsupported combination (in function init)", None, "unsupported combi", True),
+        (True, f"{ERROR} 100: no CUDA-capable device is detected", "", "is '', which hides all GPUs", False),
+        (True, f"{ERROR} 100: no CUDA-capable device is detected", None, "finds no GPU", False),
     ],
 )
 def test_no_gpu(
@@ -144,10 +139,6 @@ def test_a_driver_that_warp_refuses_to_start(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("warp.init", lambda: os.write(2, f"Warp CUDA error: {words}\n".encode()))
     start_warp()
     assert no_gpu().cause == words and no_gpu().there
-
-
-def test_what_is_no_device() -> None:
-    start_warp()
     with pytest.raises(UsageError, match="unknown device 'tpu'; here there are: cpu"):
         choose_device("tpu")
 
@@ -157,3 +148,77 @@ def test_a_message_that_several_processes_send_is_shown_once(caplog: pytest.LogC
     for _ in range(2):
         log.handle(log.makeRecord(log.name, logging.WARNING, "", 0, "sent twice", (), None))
     assert [record.message for record in caplog.records] == ["sent twice"]
+
+
+SCENE = random_scene(Kind.FILL, width=40, height=40)
+
+
+def by_torch(side: int, count: int) -> object:
+    from warpsplat.torch import SceneTensors, render
+
+    return render([SceneTensors.of(SCENE)] * count, side, side)
+
+
+def by_pydiffvg(side: int) -> object:
+    import torch
+
+    from warpsplat import pydiffvg
+
+    path = pydiffvg.Path(
+        num_control_points=torch.tensor([0, 0, 0]),
+        points=torch.tensor([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0]]),
+        is_closed=True,
+    )
+    group = pydiffvg.ShapeGroup(shape_ids=torch.tensor([0]), fill_color=torch.tensor([1.0, 0.0, 0.0, 1.0]))
+    scene = pydiffvg.RenderFunction.serialize_scene(side, side, [path], [group])
+    return pydiffvg.RenderFunction.apply(side, side, 2, 2, 0, None, *scene)
+
+
+WAYS: dict[str, Callable[[int], object]] = {
+    "scene": lambda side: warpsplat.render(SCENE, side, device="cpu"),
+    "splat": lambda side: warpsplat.render(SCENE, side, side, device="cpu", renderer="splat"),
+    "scale": lambda side: warpsplat.render(SCENE, scale=side / 40, device="cpu"),
+    "tensors": lambda side: by_torch(side, 1),
+    "several tensors": lambda side: by_torch(side, 3),
+    "pydiffvg": by_pydiffvg,
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("side", [30_000, 200_000])
+def test_pictures_too_large_for_memory_are_refused(
+    way: str, side: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "machine_memory", lambda: 8 * 10**9)
+    made: list[int] = []
+    array = backend.Backend.array
+
+    def counted(self: backend.Backend, dtype: object, *shape: int) -> object:
+        made.extend(shape)
+        return array(self, dtype, *shape)
+
+    monkeypatch.setattr(backend.Backend, "array", counted)
+    with pytest.raises(ResourceError, match=rf"of {side}x{side} px would take about .* 7\.2 GB; draw it"):
+        WAYS[way](side)
+    assert max(made, default=0) < 10**6
+
+
+def test_memory_is_not_queried_for_small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "machine_memory", lambda: pytest.fail("asked"))
+    assert warpsplat.render(SCENE, 80, device="cpu").shape == (80, 80, 4)
+
+
+def test_absurd_sizes_are_refused() -> None:
+    for way in ("scene", "tensors"):
+        with pytest.raises(UsageError, match=r"width must be a (whole )?number"):
+            WAYS[way](10**400)
+    with pytest.raises(ResourceError, match="GB"):
+        warpsplat.render(SCENE, scale=1e300, device="cpu")
+
+
+def test_free_memory_counts_on_a_gpu() -> None:
+    """Others may have taken the rest."""
+    gpu = cast(wp.Device, SimpleNamespace(is_cpu=False, free_memory=10**9, total_memory=10**11))
+    check_memory(Viewport(4000, 4000), gpu)
+    with pytest.raises(ResourceError, match=r"a picture of 5000x5000 px would take about 1\.2 GB, .* 900 MB"):
+        check_memory(Viewport(5000, 5000), gpu)

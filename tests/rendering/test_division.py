@@ -65,7 +65,7 @@ def outcome(case: str, device: str, **division: int) -> list[np.ndarray]:
 
 
 @by_case
-def test_the_lanes_of_a_gpu_do_what_one_does(device: str, case: str) -> None:
+def test_results_do_not_depend_on_lanes(device: str, case: str) -> None:
     """A GPU's vectors of pixels are shorter than a CPU's."""
     by_lanes = (outcome(case, device, lanes=lanes) for lanes in (1, 16, GPU_LANES))
     for one, *others in zip(*by_lanes, strict=True):
@@ -90,9 +90,7 @@ def test_scenes_that_outgrow_the_arrays(device: str, case: str) -> None:
 
 
 @pytest.mark.parametrize("scene", [mixed_scene(seed=1), PAINTED], ids=["plain", "painted"])
-def test_the_adjoint_of_opaque_shapes_is_the_usual_one_of_translucent_shapes(
-    device: str, scene: Scene
-) -> None:
+def test_adjoint_for_opaque_shapes_equals_the_usual_one(device: str, scene: Scene) -> None:
     usual, found = (adjoint(renderer_for(scene, device, opaque=opaque), 0.7) for opaque in (False, True))
     for name, gradient in found.items():
         assert relative_error(gradient, usual[name]) < 1e-4, name

@@ -5,11 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
-import threading
-import zlib
 from collections.abc import Iterator
-from concurrent.futures import wait
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +16,8 @@ import warp as wp
 from tests import fake_cuda
 from warpsplat.errors import DeviceError, ResourceError
 from warpsplat.kernels import constants
-from warpsplat.rendering import compiler, kernel_cache
-from warpsplat.rendering.cuda import runtime
-from warpsplat.rendering.kernel_cache import LOCK, alone_with, compile_expected, expect, load
+from warpsplat.rendering import kernel_cache
+from warpsplat.rendering.kernel_cache import LOCK, load
 
 wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own precompiled headers
 
@@ -31,12 +26,6 @@ wp.set_module_options(constants.MODULE_OPTIONS)  # others would need their own p
 def _double(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
     i = wp.tid()
     values[i] = values[i] * 2.0
-
-
-@wp.kernel(module="unique", module_options=constants.MODULE_OPTIONS)  # type: ignore[untyped-decorator]
-def _negate(values: wp.array(dtype=wp.float32)):  # type: ignore[valid-type,no-untyped-def]
-    i = wp.tid()
-    values[i] = -values[i]
 
 
 CPU = wp.get_device("cpu")
@@ -82,14 +71,12 @@ def test_a_damaged_cache_is_rebuilt(cache: Path, ending: str) -> None:
     assert len(list(cache.glob("wp_*"))) == 1, "what was damaged is gone"
 
 
-def test_a_whole_cache_is_used_as_it_is(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_binaries_of_another_processor_are_not_used(cache: Path) -> None:
     assert doubles()
-
-    def refuse(*_: object, **__: object) -> None:
-        raise AssertionError("compiled again")
-
-    monkeypatch.setattr(_double.module, "_run_codegen", refuse)
+    own = find(cache, ".o")
+    own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
     assert doubles()
+    assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
 
 
 @pytest.mark.slow
@@ -115,96 +102,6 @@ def test_without_any_place_the_message_names_the_cache(cache: Path, monkeypatch:
     with pytest.raises(ResourceError, match=r"kernel cache .*file: .*WARP_CACHE_PATH") as caught:
         doubles()
     assert caught.value.exit_code == 7
-
-
-def test_a_module_is_compiled_by_one_process(tmp_path: Path) -> None:
-    """By a lock of its own, which is no obstacle where there is no cache."""
-    fcntl = pytest.importorskip("fcntl")
-
-    def is_held(name: str) -> bool:
-        byte = zlib.crc32(name.encode())
-        handle = f"open({str(tmp_path / LOCK)!r}, 'r+')"
-        lock = f"fcntl.lockf({handle}, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, {byte})"
-        asked = subprocess.run(
-            [sys.executable, "-c", f"import fcntl; {lock}"], capture_output=True, check=False
-        )
-        return b"BlockingIOError" in asked.stderr
-
-    assert fcntl
-    with alone_with(tmp_path / "wp_one"):
-        assert is_held("wp_one")
-        assert not is_held("wp_other")
-    assert not is_held("wp_one")
-    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
-    with alone_with(tmp_path / "none" / "wp_one"):
-        pass
-    with alone_with(tmp_path / "wp_one"):
-        with alone_with(tmp_path / "wp_other"):
-            pass
-        assert is_held("wp_one"), "of two locks of a process, one is left"
-
-
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the threads in which modules are compiled."""
-    threads: list[str] = []
-    build = wp._src.build.build_cpu
-
-    def noted(*arguments: Any, **named: Any) -> Any:
-        threads.append(threading.current_thread().name)
-        return build(*arguments, **named)
-
-    monkeypatch.setattr(wp._src.build, "build_cpu", noted)
-    return threads
-
-
-def test_what_another_processor_left_is_compiled_anew_by_the_compiler(
-    cache: Path, compiled: list[str]
-) -> None:
-    """In its thread, with a message and the lock; a folder of the module alone is not enough."""
-    assert doubles()
-    own = find(cache, ".o")
-    own.rename(own.with_name(f"{own.name.split('.')[0]}.cpu01234567.o"))
-    assert doubles()
-    assert [name.split()[:2] for name in compiled] == [["warpsplat", "compiler"]] * 2
-    assert own.exists() and len(list(own.parent.glob("*.o"))) == 2
-
-
-def test_what_was_announced_is_compiled_with_what_is_needed(cache: Path, compiled: list[str]) -> None:
-    _negate.module.unload()
-    expect(_negate, CPU)
-    assert compiled == []
-    assert doubles()
-    wait(list(kernel_cache._builds.values()))
-    assert len(compiled) == 2
-    load(_negate, CPU)
-    assert len(compiled) == 2
-
-
-def test_headers_are_precompiled_once(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They take longer than all kernels of a step."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    monkeypatch.setattr(compiler, "available_cores", lambda: 2)
-    compiler._compiler.cache_clear()
-    _negate.module.unload()
-    expect(_negate, CPU)
-    assert doubles()
-    wait(list(kernel_cache._builds.values()))
-    compiler._compiler.cache_clear()
-    assert len(list(folder.rglob("*.pch"))) == 1
-
-
-def test_what_is_compiled_before_it_is_needed_may_fail(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is compiled again then, to say why."""
-    with monkeypatch.context() as patch:
-        patch.setattr(wp._src.build, "build_cpu", None)
-        expect(_double, CPU)
-        compile_expected()
-        assert wait(list(kernel_cache._builds.values())).done
-    load(_double, CPU)
-    assert find(cache, ".o")
 
 
 TWO = """
@@ -269,7 +166,7 @@ def test_each_kind_of_device_has_a_binary_of_its_own(tmp_path: Path, monkeypatch
         assert find(tmp_path, ending)
 
 
-def test_what_a_compiler_refuses_is_shown_in_its_words(
+def test_compiler_errors_are_shown(
     cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Once: another try, or another folder, would not help."""
@@ -288,26 +185,11 @@ def test_what_a_compiler_refuses_is_shown_in_its_words(
     assert len(tries) == 1 and "WARP_CACHE_PATH" not in caplog.text
 
 
-def test_a_module_that_cannot_be_loaded_although_it_is_whole(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert doubles()
-    good = find(cache, ".o").read_bytes()
-    with monkeypatch.context() as patch:
-        patch.setattr(runtime().llvm, "wp_load_obj", lambda *_: 1)
-        with pytest.raises(
-            DeviceError, match=r"kernels cannot be loaded on the CPU: Failed to load CPU module"
-        ):
-            doubles()
-    assert find(cache, ".o").read_bytes() == good, "compiled again, in case that it was damaged"
-    assert doubles()
-
-
 @pytest.mark.parametrize(
     ("fail", "words"),
     [("load", "loaded on cuda:0 (Test device): "), ("compile", "compiled for cuda:0 (Test device): ")],
 )
-def test_what_a_gpu_refuses_is_shown_in_its_words(
+def test_driver_errors_are_shown(
     fail: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path))

@@ -1,14 +1,12 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.scenes import mixed_scene, random_scene
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.parameters import Parameters
-from warpsplat.scene import ATTRIBUTES, Basis, Kind, Scene
+from warpsplat.scene import ATTRIBUTES, Kind, Scene
 
 SCENES = {
     "fills": (random_scene(Kind.FILL, count=6), random_scene(Kind.FILL, count=2, seed=1)),
@@ -17,22 +15,15 @@ SCENES = {
 }
 
 
-def with_a_past(parameters: Parameters) -> dict[str, list[np.ndarray]]:
-    """Random moments, by attribute; ages from 10 on."""
-    rng = np.random.default_rng(0)
-    moments = {}
-    for name, group in parameters.groups.items():
-        moments[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
-        group.moment1.assign(moments[name][0])
-        group.moment2.assign(moments[name][1])
-    parameters.arrays["ages"].assign(np.arange(10, 10 + parameters.shape_count, dtype=np.int32))
-    return moments
-
-
 @pytest.mark.parametrize(("scene", "added"), SCENES.values(), ids=SCENES.keys())
 def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scene) -> None:
     parameters = Parameters(scene, Backend.on(device))
-    before = with_a_past(parameters)
+    rng, before = np.random.default_rng(0), {}
+    for name, group in parameters.groups.items():
+        before[name] = [rng.normal(size=group.value.shape).astype(np.float32) for _ in range(2)]
+        group.moment1.assign(before[name][0])
+        group.moment2.assign(before[name][1])
+    parameters.arrays["ages"].assign(np.arange(10, 10 + parameters.shape_count, dtype=np.int32))
     keep = np.array([4, 0, 3, 5])
     parameters.rearrange(keep, added)
     after, wanted = parameters.scene(), scene.take(keep).append(added)
@@ -46,53 +37,3 @@ def test_surgery_carries_moments_and_ages(device: str, scene: Scene, added: Scen
             np.testing.assert_array_equal(moment.numpy()[: len(rows)], old[rows])
             assert not moment.numpy()[len(rows) :].any()
     assert parameters.revision == 1
-
-
-def test_fewer_points_keep_their_moments(device: str) -> None:
-    """Shapes, their order and their ages stay; the rows of what has rows by shape, too."""
-    scene = random_scene(Kind.FILL, count=3, basis=Basis.SPLINE, beziers=6).append(mixed_scene())
-    parameters = Parameters(scene, Backend.on(device))
-    moments, ages = with_a_past(parameters), 10 + np.arange(len(scene))
-    keep = np.delete(np.arange(len(scene.points)), [1, 4, 13])
-    mask = np.isin(np.arange(len(scene.points)), keep)
-    parameters.reshape(replace(scene, points=scene.points + 1).without_points(mask), keep)
-    points = scene.points[keep] + 1
-    after = parameters.scene()
-    assert after.point_counts()[:4].tolist() == [4, 6, 5, 12]
-    np.testing.assert_array_equal(after.points, points)
-    np.testing.assert_array_equal(parameters.arrays["ages"].numpy(), ages)
-    for attribute in ATTRIBUTES:
-        group = parameters.groups[attribute.name]
-        rows = keep if attribute.per == "point" else np.arange(len(moments[attribute.name][0]))
-        for moment, old in zip((group.moment1, group.moment2), moments[attribute.name], strict=True):
-            np.testing.assert_array_equal(moment.numpy(), old[rows])
-    assert parameters.revision == 1
-
-
-def test_held_rows_until_the_next_surgery(device: str) -> None:
-    scene = mixed_scene()
-    parameters = Parameters(scene, Backend.on(device))
-    assert not any(group.held.numpy().any() for group in parameters.groups.values())
-    rows = np.arange(len(scene.points)) % 3 == 1
-    parameters.hold("points", rows)
-    np.testing.assert_array_equal(parameters.groups["points"].held.numpy(), rows)
-    assert not parameters.groups["colors"].held.numpy().any()
-    parameters.rearrange(np.arange(3), scene.take(np.arange(1)))
-    assert not parameters.groups["points"].held.numpy().any()
-
-
-def test_assigned_values_leave_all_else_as_it_is(device: str) -> None:
-    scene = mixed_scene()
-    parameters = Parameters(scene, Backend.on(device))
-    group = parameters.groups["points"]
-    group.moment1.fill_(2.0)
-    address = group.value.ptr
-    other = replace(scene, points=scene.points + 1, colors=scene.colors * 0.5)
-    parameters.assign(other)
-    for attribute in ATTRIBUTES:
-        np.testing.assert_array_equal(
-            getattr(parameters.scene(), attribute.name), getattr(other, attribute.name)
-        )
-    assert parameters.groups["points"].value.ptr == address
-    assert (parameters.groups["points"].moment1.numpy() == 2).all()
-    assert parameters.revision == 0

@@ -1,12 +1,18 @@
+"""Scenes, and what is measured of their shapes."""
+
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
-from tests.scenes import canvas, contours_scene, mixed_scene, random_scene, with_gradients
-from warpsplat.scene import ATTRIBUTES, NO_DASHES, TRAITS, Basis, Cap, Kind, Rule, Scene
+from tests.reference.curves import spline_at
+from tests.scenes import canvas, contours_scene, disc, mixed_scene, random_scene, styled_scene, with_gradients
+from warpsplat.scene import ATTRIBUTES, NO_DASHES, TRAITS, Basis, Cap, Join, Kind, Rule, Scene
+from warpsplat.scene.geometry import areas, bounds, enlarged, flatten
+from warpsplat.scene.geometry import beziers as beziers_of
 
 
 def test_arrays_must_fit() -> None:
@@ -34,19 +40,6 @@ def test_shapes_have_whole_curves(basis: Basis, kind: Kind, counts: tuple[int, .
             Scene.uniform(kind, canvas(9, 9), np.zeros((2, count, 2), np.float32), basis)
     scene = Scene.uniform(kind, canvas(9, 9), np.zeros((2, 5, 2), np.float32), Basis.SPLINE)
     assert scene.bezier_counts().tolist() == 2 * [5 if kind == Kind.FILL else 3]
-
-
-def test_uniform_leaves_the_rest_at_0() -> None:
-    points = np.arange(48, dtype=np.float32).reshape(2, 12, 2)
-    scene = Scene.uniform(Kind.FILL, canvas(9, 9), points, opacities=np.array([0.5, 0.7], np.float32))
-    assert scene.first.tolist() == [0, 12, 24]
-    assert set(scene.basis) == {Basis.CUBIC} and scene.bezier_counts().tolist() == [4, 4]
-    np.testing.assert_array_equal(scene.points_of(1), points[1])
-    np.testing.assert_array_equal(scene.opacities, np.float32([0.5, 0.7]))
-    assert not scene.colors.any()
-    assert not scene.widths.any()
-    with pytest.raises(TypeError, match="colours"):
-        Scene.uniform(Kind.FILL, canvas(9, 9), points, colours=np.zeros((2, 3), np.float32))
 
 
 def test_take_and_append() -> None:
@@ -103,3 +96,44 @@ def test_a_shape_without_its_twin_is_alone() -> None:
         replace(pair, twin=np.array([1, 0], np.int32))
     with pytest.raises(ValueError, match="not those of the shapes' contours"):
         replace(pair, starts=pair.starts[:-1])
+
+
+@pytest.mark.parametrize("cubics", [3, 4, 7])
+def test_area_and_bounds_of_a_disc(cubics: int) -> None:
+    scene = disc(10, 30, 15, cubics)
+    assert areas(scene)[0] == pytest.approx(np.pi * 100, rel=0.02)
+    np.testing.assert_allclose(bounds(scene)[0], [5, 5, 25, 25], atol=0.3)
+
+
+def test_area_of_a_stroke_is_length_times_width() -> None:
+    scene = random_scene(Kind.STROKE, count=1)
+    line = np.stack([np.linspace(5, 35, 10), np.full(10, 9.0)], axis=1).astype(np.float32)
+    straight = replace(scene, points=line, widths=np.array([4.0], np.float32))
+    assert areas(straight)[0] == pytest.approx(120, rel=1e-4)
+    np.testing.assert_allclose(bounds(straight)[0], [3, 7, 37, 11], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "beziers"),
+    [(Kind.STROKE, 1), (Kind.STROKE, 2)] + [(kind, n) for kind in Kind for n in (3, 4, 12)],
+)
+def test_splines_are_flattened_where_they_are(kind: Kind, beziers: int) -> None:
+    """Against de Boor's recursion, whose points the outline as cubics passes at the same parameters."""
+    scene = random_scene(kind, 3, basis=Basis.SPLINE, beziers=beziers)
+    (group,) = scene.alike()
+    assert beziers_of(group.points, group.closed, Basis.SPLINE).shape == (3, beziers, 4, 2)
+    lines = flatten(group.points, group.closed, Basis.SPLINE, pieces=5)
+    t = torch.arange(5 * beziers + (kind == Kind.STROKE), dtype=torch.float64) / 5
+    for line, points in zip(lines, group.points, strict=True):
+        want = spline_at(torch.tensor(points, dtype=torch.float64), kind == Kind.FILL, t)
+        np.testing.assert_allclose(line, want, atol=1e-5)
+
+
+def test_an_enlarged_scene_looks_the_same() -> None:
+    """Dashes grow with their strokes, and pixel art stays crisp."""
+    scene = styled_scene(Cap.BUTT, Join.MITER, 0)
+    scene = replace(scene, canvas=replace(scene.canvas, crisp=True))
+    large = enlarged(scene, 3, 3 * scene.canvas.width, 3 * scene.canvas.height)
+    assert large.canvas.crisp
+    np.testing.assert_allclose(large.dashes[0], 3 * np.array(scene.dashes[0]))
+    np.testing.assert_allclose(areas(large), 9 * areas(scene), rtol=1e-4)

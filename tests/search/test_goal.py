@@ -1,4 +1,4 @@
-"""The search for a file that meets a goal, and files of few shapes."""
+"""The search for a file that meets a goal, and fits that continue from each other."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from tests.fit.pictures import picture
 from tests.scenes import disc, random_scene
 from warpsplat.fit.loop import fit
 from warpsplat.fit.problem import Fit, Problem, Run
+from warpsplat.fit.progress import Progress
+from warpsplat.fit.schedule import shapes_at
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -22,6 +24,7 @@ from warpsplat.search.candidate import (
     smaller,
 )
 from warpsplat.search.goal import AIM_FULL, next_change
+from warpsplat.search.series import Series, begin_of
 from warpsplat.svg.write import path_sizes
 
 
@@ -81,7 +84,7 @@ def test_without_more_shapes_the_grid_gets_finer(scene: Scene) -> None:
     assert next_change([made(scene, 1000, 26.0, 100.0)], few) is None
 
 
-def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
+def test_the_background_is_fitted_to_what_shows_between_shapes(device: str) -> None:
     backend = Backend.on(device)
     scene = disc(10, 30, 15)
     wanted = np.array([0.2, 0.6, 0.8], np.float32)
@@ -95,7 +98,7 @@ def test_the_ground_is_what_shows_between_shapes(device: str) -> None:
 
 
 @pytest.mark.parametrize("excess", [10, 60, 200])
-def test_what_is_less_than_a_shape_goes_by_points(excess: float) -> None:
+def test_small_excess_is_removed_by_points(excess: float) -> None:
     scene = random_scene(Kind.FILL, count=6, basis=Basis.SPLINE)
     sizes = path_sizes(scene, 1.0)
     seen = np.arange(1, 7, dtype=np.float32)
@@ -103,3 +106,40 @@ def test_what_is_less_than_a_shape_goes_by_points(excess: float) -> None:
     gone = sizes.sum() - path_sizes(left, 1.0).sum()
     assert 0 < gone < excess + sizes.mean() / 3
     assert len(scene) - len(left) == (np.cumsum(sizes) <= excess).sum()
+
+
+@pytest.mark.parametrize(("few", "share"), [(10, 0.25), (128, 0.275), (180, 0.35), (250, 0.375)])
+def test_a_fit_begins_where_its_schedule_has_as_many_shapes(few: int, share: float) -> None:
+    settings = make_settings(curves=256)
+    begin = begin_of(settings, round(1.5 * few))
+    assert begin == pytest.approx(1000 * share, abs=25) and begin % 25 == 0
+    if few == 180:
+        assert shapes_at(settings, begin) == pytest.approx(1.5 * few, rel=0.1)
+
+
+def quick() -> Settings:
+    return make_settings(
+        subject="photo", iterations=60, curves=4, coarse_pixels=400, density={"interval": 3}, viewer=False
+    )
+
+
+def test_the_next_fit_continues_optimizer_state() -> None:
+    """The first step of another fit is the next one of the first: the optimizer forgot nothing."""
+    settings, seen = quick(), list[Progress]()
+    run, series = Run(Backend.on("cpu", 1), seen.append), Series(quick(), (4, 8))
+    first, none = series.next(4)
+    assert none is None
+    fit(Problem(picture(), first), series.part(4, run))
+    assert [p.work for p in seen] == sorted(p.work for p in seen)
+    assert seen[-1].work == pytest.approx(1 / 3)
+    second, start = series.next(8)
+    assert start is not None and start.past is not None and start.scene is not None
+    assert start.begin == begin_of(second, 6) > 0
+    assert len(start.scene) == round(1.5 * 4), "the surplus, before it is thinned"
+    assert start.past.ages.max() >= 0.6 * settings.iterations
+    moments = start.past.moments[1]["points"]
+    assert moments.shape == start.scene.points.shape and (moments > 0).any()
+    made = fit(Problem(picture(), second), series.part(8, run), start)
+    assert len(made.scene) == 8
+    assert made.iterations == settings.iterations - start.begin
+    assert seen[-1].work == 1

@@ -1,4 +1,4 @@
-"""Engines that are kept: as few as needed, and no more than allowed."""
+"""Engines that are kept: as few as needed, and no more than allowed; several scenes in one call."""
 
 from __future__ import annotations
 
@@ -62,17 +62,6 @@ def test_changing_scenes_do_not_compile(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(kept.engines) == 3
 
 
-def test_bytes_are_counted_and_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = random_scene(Kind.FILL, 2)
-    step(scene)
-    step(scene, 800)
-    small, large = (each.bytes for _, each in kept.engines)
-    assert 50_000 < small < large / 20
-    monkeypatch.setattr(kept, "_limit", lambda device: 1)
-    step(random_scene(Kind.FILL, 3))
-    assert len(kept.engines) == 1
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="asks the system for the size of the process")
 def test_many_steps_need_no_more_memory() -> None:
     """Images and gradients of a quarter of a megabyte: one in five that is kept would show."""
@@ -124,19 +113,77 @@ def test_a_captured_engine_stays_as_it_is(capturing: Callable[[bool], None]) -> 
 
 def test_opacities_in_a_graph_stay_where_their_adjoint_is_right(capturing: Callable[[bool], None]) -> None:
     scene = random_scene(Kind.FILL, 3)
-    opaque = replace(scene, opacities=np.ones(3, np.float32))
     step(scene)
     capturing(True)
+    opaque = replace(scene, opacities=np.ones(3, np.float32))
     tensors = SceneTensors.of(opaque, requires_grad=True)
     image = render(tensors, 40)
     image.sum().backward()
-    gradients = [value.grad for value in tensors.values.values() if value.grad is not None]
-    assert all(gradient.isfinite().all() for gradient in gradients)
+    assert all(value.grad.isfinite().all() for value in tensors.values.values() if value.grad is not None)
     capturing(False)
     assert (image - render(tensors, 40)).abs().max() < 3e-3
 
 
-def test_a_graph_of_what_was_not_rendered_before_is_refused(capturing: Callable[[bool], None]) -> None:
+def test_capturing_an_unrendered_scene_is_refused(capturing: Callable[[bool], None]) -> None:
     capturing(True)
     with pytest.raises(UsageError, match="rendered before"):
         step(random_scene(Kind.FILL, 3))
+
+
+Tensor = torch.Tensor
+
+
+def shifted(count: int) -> list[Scene]:
+    """Return scenes of one structure."""
+    scene = random_scene(Kind.FILL, 5)
+    return [replace(scene, points=scene.points + np.float32(i)) for i in range(count)]
+
+
+def mixed() -> list[Scene]:
+    """Return scenes of several structures, one of them opaque."""
+    opaque = replace(random_scene(Kind.FILL, 4), opacities=np.ones(4, np.float32))
+    return [*shifted(2), random_scene(Kind.STROKE, 3), opaque]
+
+
+def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[Tensor]:
+    """Return images and gradients."""
+    tensors = [SceneTensors.of(scene, requires_grad=True) for scene in scenes]
+    wanted = [[v for v in each.values.values() if v.requires_grad] for each in tensors]
+    height, width = scenes[0].canvas.height, scenes[0].canvas.width
+    weights = torch.rand(len(scenes), height, width, 4, generator=torch.Generator().manual_seed(0))
+    if at_once:
+        images = render(tensors, threads=threads)
+        leaves = [leaf for own in wanted for leaf in own]
+        return [*images.detach(), *torch.autograd.grad(images, leaves, weights)]
+    images = torch.stack([render(each, threads=threads) for each in tensors])
+    gradients = [
+        torch.autograd.grad(render(each, threads=threads), own, weight)
+        for each, own, weight in zip(tensors, wanted, weights, strict=True)
+    ]
+    return [*images.detach(), *(gradient for own in gradients for gradient in own)]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+@pytest.mark.parametrize("scenes", [shifted(5), mixed(), shifted(1)], ids=["shifted", "mixed", "one"])
+def test_a_batch_has_the_bits_of_single_calls(scenes: list[Scene], threads: int) -> None:
+    for one, other in zip(found(scenes, threads, at_once=True), found(scenes, 1, at_once=False), strict=True):
+        assert torch.equal(one, other)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_scene_that_cannot_be_drawn_is_refused(threads: int) -> None:
+    scenes = [SceneTensors.of(scene) for scene in shifted(3)]
+    scenes[1].values["points"][0, 0] = float("nan")
+    with pytest.raises(ValueError, match="points: numbers that are not finite"):
+        render(scenes, threads=threads)
+    assert torch.equal(render(scenes[::2], threads=threads)[1], render(scenes[2]))
+
+
+def test_part_of_the_images_and_part_of_the_tensors() -> None:
+    tensors = [SceneTensors.of(scene) for scene in shifted(3)]
+    tensors[1].values["colors"].requires_grad_()
+    render(tensors)[1].sum().backward()
+    alone = tensors[1].values["colors"].detach().clone().requires_grad_()
+    render(SceneTensors(tensors[1].layout, {**tensors[1].values, "colors": alone})).sum().backward()
+    assert alone.grad is not None
+    assert torch.equal(alone.grad, tensors[1].values["colors"].grad)

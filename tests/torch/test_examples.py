@@ -1,7 +1,8 @@
-"""The examples run, and what they fit gets better."""
+"""The examples and notebooks run, and what they fit gets better."""
 
 from __future__ import annotations
 
+import json
 import runpy
 import sys
 from itertools import pairwise
@@ -83,7 +84,7 @@ def test_a_network_compares(cat: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))
-def test_a_script_without_files_says_which_it_takes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_script_without_arguments_prints_its_usage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", [name])
     with pytest.raises(SystemExit, match=rf"usage: .*{name} "):
         runpy.run_path(str(EXAMPLES / name), run_name="__main__")
@@ -93,3 +94,56 @@ def test_all_examples_are_listed() -> None:
     names = {path.name for path in EXAMPLES.iterdir() if path.suffix in {".py", ".ipynb"}}
     listed = (EXAMPLES / "README.md").read_text()
     assert all(f"`{name}`" in listed for name in names)
+
+
+NOTEBOOKS = pytest.mark.parametrize("path", sorted(ROOT.glob("examples/*.ipynb")), ids=lambda path: path.stem)
+MAX_BYTES = 100_000
+"""Largest notebook: pictures in a repository's history stay there."""
+
+
+def from_script(name: str) -> Any:
+    return runpy.run_path(str(ROOT / "docs" / "notebooks.py"))[name]
+
+
+def outputs(notebook: Any) -> list[tuple[str, ...]]:
+    """Return the kinds of what each cell shows."""
+    return [
+        tuple(kind for output in cell.get("outputs", ()) for kind in output.get("data", {"text": ""}))
+        for cell in notebook["cells"]
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of Jupyter's parts, about one another
+@NOTEBOOKS
+def test_notebooks_run_and_match_their_stored_outputs(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    stored = path.read_text("utf-8")
+    short = tmp_path / path.name
+    short.write_text(stored.replace("range(81)", "range(21)"), "utf-8")
+    found = from_script("run")(short)
+    assert list(map(set, outputs(found))) == list(map(set, outputs(json.loads(stored))))
+
+
+@NOTEBOOKS
+def test_pages_of_notebooks_have_every_cell(path: Path) -> None:
+    assert path.stat().st_size < MAX_BYTES
+    cells = json.loads(path.read_text("utf-8"))["cells"]
+    page = from_script("page")(path)
+    assert page.startswith("# ")
+    assert page.count("```python\n") == sum(cell["cell_type"] == "code" for cell in cells)
+    for cell in cells:
+        assert "".join(cell["source"]) in page
+    pictures = [
+        kind
+        for kinds in outputs({"cells": cells})
+        for kind in kinds
+        if kind.startswith(("image", "text/html"))
+    ]
+    assert pictures
+    assert page.count("<img ") == len(pictures)

@@ -1,14 +1,17 @@
-"""Gradients through torch against float64 autograd, for all shapes, paints and models."""
+"""Gradients through torch against float64 autograd, and of edges on borders of pixels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+import warpsplat
+from tests.helpers import relative_error
 from tests.scenes import (
     contours_scene,
     mixed_scene,
@@ -60,7 +63,7 @@ def test_opacities_of_one(name: str, transparent: bool) -> None:
 
 @pytest.mark.parametrize("name", ["mixed", "opaque", "gradients"])
 @pytest.mark.parametrize("threads", [1, 2])
-def test_colors_that_are_not_premultiplied(name: str, threads: int) -> None:
+def test_straight_colors(name: str, threads: int) -> None:
     """Opaque shapes hide others, some of which are faint or invisible."""
     opacities = np.array([0.7, 1, 0.001, 1, 0.3, 0.02], np.float32)
     opaque = replace(random_scene(Kind.FILL, 6, seed=4), opacities=opacities)
@@ -101,7 +104,7 @@ def whole(scene: Scene) -> dict[str, torch.Tensor | None]:
     return {name: value.grad for name, value in tensors.values.items()}
 
 
-def test_some_gradients_are_those_of_all() -> None:
+def test_gradients_of_one_tensor_equal_those_of_all() -> None:
     scene = with_gradients(mixed_scene(seed=2))
     wanted = whole(scene)
     for name in ("points", "frames", "stop_colors"):
@@ -123,3 +126,62 @@ def test_gradients_flow_on_to_the_leaves() -> None:
     assert points is not None and colors.grad is not None
     torch.testing.assert_close(shift.grad, points.sum(dim=0), rtol=1e-4, atol=1e-3)
     torch.testing.assert_close(colors.grad.T, whole(scene)["colors"], rtol=0, atol=0)
+
+
+Tensor = torch.Tensor
+
+SIZE = 48
+OFFSETS = [0.0, 1e-4, -1e-4, 0.3, 0.5]  # of coordinates that are whole numbers [px]
+STEP = 0.02
+"""Of central differences [px]."""
+
+SHAPES = {
+    "rectangle at borders of tiles": '<rect x="16" y="16" width="16" height="20" {fill}/>',
+    "polygon": '<path d="M8 8H40V32H17V21H8Z" {fill}/>',
+    "other direction": '<path d="M8 8V32H32V8Z" {fill}/>',
+    "hole": '<path fill-rule="evenodd" d="M8 8H40V40H8Z M16 16H24V32H16Z" {fill}/>',
+    "circle": '<circle cx="24" cy="20" r="12" {fill}/>',
+    "upright line": '<path d="M16 10V38" {stroke} stroke-width="8"/>',
+    "level line": '<path d="M10 16H38" {stroke} stroke-width="8"/>',
+    "butt caps": '<path d="M10.5 10V40" {stroke} stroke-width="3" stroke-linecap="butt"/>',
+    "slanted line": '<path d="M10 10L38 38" {stroke} stroke-width="8"/>',
+}
+PAINTS = {"fill": 'fill="#4a8"', "stroke": 'fill="none" stroke="#4a8"'}
+
+
+def weighted(image: Tensor) -> Tensor:
+    """Return a sum over an image with weights that hardly change from pixel to pixel."""
+    y, x = torch.meshgrid(torch.arange(SIZE), torch.arange(SIZE), indexing="ij")
+    weights = (1 + 0.0005 * x + 0.0003 * y)[..., None] * torch.tensor([0.5, -0.8, 0.3, 1.0])
+    return (image.double() * weights).sum()
+
+
+def differences(loss: Callable[[Tensor], Tensor], at: Tensor) -> Tensor:
+    """Return the central differences of a function of a tensor."""
+    found = torch.zeros(at.numel())
+    with torch.no_grad():
+        for i, step in enumerate((STEP * torch.eye(at.numel())).to(at).view(-1, *at.shape)):
+            found[i] = (loss(at + step) - loss(at - step)) / (2 * STEP)
+    return found.view(at.shape)
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+@pytest.mark.parametrize("name", SHAPES)
+def test_gradients_on_pixel_borders_match_finite_differences(
+    tmp_path: Path, name: str, offset: float
+) -> None:
+    shape = f'<g transform="translate({offset} {offset})">{SHAPES[name].format(**PAINTS)}</g>'
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIZE}" height="{SIZE}">{shape}</svg>'
+    path = tmp_path / "shape.svg"
+    path.write_text(svg, encoding="utf-8")
+    tensors = SceneTensors.of(warpsplat.load_svg(path))
+
+    def loss(values: Tensor, name: str) -> Tensor:
+        changed = SceneTensors(tensors.layout, {**tensors.values, name: values})
+        return weighted(render(changed))
+
+    for attribute in ("points", "widths") if "stroke" in shape else ("points",):
+        value = tensors.values[attribute].clone().requires_grad_()
+        (gradient,) = torch.autograd.grad(loss(value, attribute), value)
+        wanted = differences(lambda x, name=attribute: loss(x, name), value.detach())  # type: ignore[misc]
+        assert relative_error(gradient.numpy(), wanted.numpy()) < 1e-3, attribute

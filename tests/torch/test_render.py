@@ -1,4 +1,4 @@
-"""``warpsplat.torch.render``: the renderer's image, calls in any order, refusals."""
+"""``warpsplat.torch.render``: the renderer's image, calls in any order, transforms."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from torch.func import functional_call, grad, hessian, jacrev, jvp, vjp, vmap
 
 from tests import ROOT
 from tests.scenes import disc, mixed_scene, random_scene
@@ -20,7 +21,7 @@ from warpsplat.fit.renderers import renderer_of
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render as native_render
 from warpsplat.scene import Canvas, Kind, Scene
-from warpsplat.torch import SceneTensors, over, render, tensors
+from warpsplat.torch import Module, SceneTensors, over, render, tensors
 
 FILL = Kind.FILL
 
@@ -59,12 +60,6 @@ def test_every_model_on_a_transparent_canvas(name: str) -> None:
     np.testing.assert_allclose(render(SceneTensors.of(scene), renderer=name).numpy(), native, atol=1e-5)
 
 
-def test_attributes_without_a_tensor_are_the_layouts() -> None:
-    scene = random_scene(FILL)
-    for changed in (scene, replace(scene, colors=1 - scene.colors)):
-        assert_equal(render(SceneTensors(changed, {})), render(SceneTensors.of(changed)))
-
-
 def test_opaque_shapes_and_no_shapes() -> None:
     white = disc(60, 40, 20)
     assert (render(SceneTensors.of(white)) - 1).abs().max() < 1e-5
@@ -90,19 +85,6 @@ def test_one_side_gives_the_other(size: dict[str, int]) -> None:
     height, width, planes = render(SceneTensors.of(random_scene(FILL)), **size).shape
     assert {"width": width, "height": height}.items() >= size.items()
     assert (10 * height, planes) == (9 * width, 4)
-
-
-def test_a_list_of_scenes_is_each_of_them() -> None:
-    scenes = [
-        SceneTensors.of(random_scene(kind, 3, seed=k), requires_grad=True) for k, kind in enumerate(Kind)
-    ]
-    scenes.append(moved(random_scene(FILL, 3), 2.0))
-    images = render(scenes)
-    assert images.shape == (3, 36, 40, 4)
-    images.square().sum().backward()
-    for image, scene in zip(images, scenes, strict=True):
-        assert_equal(image, render(scene))
-        assert_equal(scene.values["points"].grad, points_grad(loss_of(scene), scene))
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
@@ -148,12 +130,6 @@ def test_several_threads_find_what_one_finds(threads: int) -> None:
                 assert_equal(gradient, want)
 
 
-def test_a_scene_is_drawn_as_its_tensors_are() -> None:
-    scene = random_scene(FILL)
-    assert_equal(render(scene), render(SceneTensors.of(scene)))
-    assert_equal(render([scene, moved(scene, 1.0)])[0], render(scene))
-
-
 def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tensors, "_warn_of_float64", functools.cache(tensors._warn_of_float64.__wrapped__))
     scene = moved(random_scene(FILL), 0.0)
@@ -178,3 +154,70 @@ def test_without_torch_one_line_says_what_to_do() -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     message = "ImportError: warpsplat.torch needs PyTorch: pip install warpsplat[torch]"
     assert done.stderr.splitlines()[-1] == message
+
+
+Tensor = torch.Tensor
+LAYOUT = random_scene(Kind.FILL, 3)
+POINTS = torch.tensor(LAYOUT.points)
+OPACITIES = torch.tensor(LAYOUT.opacities)
+BATCH = torch.stack([POINTS, POINTS + 1, POINTS - 3])
+"""Shape (scene, point, 2)."""
+FAINT_TO_OPAQUE = torch.stack([OPACITIES * 0.3, OPACITIES, torch.ones_like(OPACITIES)])
+
+
+def planes(points: Tensor, opacities: Tensor = OPACITIES) -> Tensor:
+    """Return the mean square of each plane of the image, shape (4,)."""
+    return render(SceneTensors(LAYOUT, {"points": points, "opacities": opacities})).square().mean(dim=(0, 1))
+
+
+def loss(points: Tensor, opacities: Tensor) -> Tensor:
+    return planes(points, opacities).sum()
+
+
+def plain(points: Tensor, opacities: Tensor) -> tuple[Tensor, ...]:
+    inputs = points.clone().requires_grad_(), opacities.clone().requires_grad_()
+    return torch.autograd.grad(loss(*inputs), inputs)
+
+
+def same(one: object, other: object) -> None:
+    torch.testing.assert_close(one, other, rtol=0, atol=0)
+
+
+def test_grad_and_vjp() -> None:
+    same(grad(loss, (0, 1))(POINTS, OPACITIES), plain(POINTS, OPACITIES))
+    pull = vjp(planes, POINTS)[1]
+    jacobian = jacrev(planes)(POINTS)
+    same(jacobian[1], pull(torch.eye(4)[1].float())[0])
+    torch.testing.assert_close(jacobian.sum(dim=0), plain(POINTS, OPACITIES)[0])
+
+
+def test_vmap_is_the_call_with_a_list() -> None:
+    scenes = [SceneTensors(LAYOUT, {"points": each}) for each in BATCH]
+    same(vmap(lambda each: render(SceneTensors(LAYOUT, {"points": each})))(BATCH), render(scenes))
+    same(vmap(planes, in_dims=(2, None))(BATCH.movedim(0, 2), OPACITIES), torch.stack([*map(planes, BATCH)]))
+
+
+def test_vmap_of_grad_and_grad_of_vmap() -> None:
+    """Scenes of a batch differ in whether one of their shapes is opaque, which takes another adjoint."""
+    wanted = [plain(*each) for each in zip(BATCH, FAINT_TO_OPAQUE, strict=True)]
+    stacked = tuple(map(torch.stack, zip(*wanted, strict=True)))
+    same(vmap(grad(loss, (0, 1)))(BATCH, FAINT_TO_OPAQUE), stacked)
+    inputs = BATCH.clone().requires_grad_(), FAINT_TO_OPAQUE.clone().requires_grad_()
+    same(torch.autograd.grad(vmap(loss)(*inputs).sum(), inputs), stacked)
+
+
+def test_a_module_as_a_function_of_its_parameters() -> None:
+    module = Module(LAYOUT)
+    parameters = {name: value.detach() for name, value in module.named_parameters()}
+    found = grad(lambda own: functional_call(module, own, ()).square().mean())(parameters)
+    module().square().mean().backward()
+    same(found, {name: value.grad for name, value in module.named_parameters()})
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:torch.jit._script")  # torch uses it itself
+def test_there_are_first_derivatives_only() -> None:
+    with pytest.raises(RuntimeError, match="first derivatives only"):
+        grad(lambda points: grad(loss)(points, OPACITIES).sum())(POINTS)
+    for transform in (lambda: hessian(planes)(POINTS), lambda: jvp(planes, (POINTS,), (POINTS,))):
+        with pytest.raises(NotImplementedError, match="forward mode"):
+            transform()

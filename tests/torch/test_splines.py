@@ -12,7 +12,6 @@ import warpsplat
 from tests.scenes import contours_scene
 from warpsplat.errors import UsageError
 from warpsplat.paper.chains import as_chains
-from warpsplat.paper.models import SplatModel
 from warpsplat.scene import Kind, Rule, Scene
 from warpsplat.torch import SceneTensors, render
 
@@ -26,7 +25,7 @@ def start(*, open: bool) -> Scene:
 
 @pytest.mark.parametrize("renderer", ["splat", "gaussian"])
 @pytest.mark.parametrize("open", [False, True])
-def test_the_image_is_that_of_the_cubics(renderer: str, open: bool) -> None:
+def test_the_image_equals_that_of_the_converted_cubics(renderer: str, open: bool) -> None:
     scene = start(open=open)
     tensors = SceneTensors.of(scene, requires_grad=True)
     image = render(tensors, renderer=renderer)
@@ -34,7 +33,7 @@ def test_the_image_is_that_of_the_cubics(renderer: str, open: bool) -> None:
     np.testing.assert_allclose(warpsplat.render(scene, renderer=renderer), image.detach().numpy(), atol=2e-5)
 
 
-def test_gradients_are_those_of_the_cubics_through_their_weights() -> None:
+def test_gradients_equal_those_of_the_converted_cubics() -> None:
     scene = start(open=False)
     tensors = SceneTensors.of(scene, requires_grad=True)
     render(tensors, renderer="splat").square().sum().backward()
@@ -53,15 +52,10 @@ def test_gradients_are_those_of_the_cubics_through_their_weights() -> None:
     assert torch.allclose((found * step).sum(), (inner * change).sum(), rtol=1e-2, atol=1e-5)
 
 
-def test_what_has_no_such_form_is_refused_in_one_line() -> None:
+def test_several_contours_are_refused_in_one_line() -> None:
     scene = contours_scene(Kind.FILL, Rule.EVENODD)
     for draw in (render, warpsplat.render):
         with pytest.raises(
             UsageError, match="several contours, which the renderer splat cannot draw; the renderer exact"
         ):
             draw(scene, renderer="splat")
-
-
-def test_a_model_itself_takes_cubics_only() -> None:
-    with pytest.raises(ValueError, match="is a spline, not cubics"):
-        render(start(open=False), renderer=SplatModel())

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from warpsplat.files.sources import image_of
+from warpsplat.metrics import psnr
 from warpsplat.scene import FloatArray
 from warpsplat.svg.viewer import render_own
 
@@ -52,12 +53,24 @@ def draw(body: str, width: int = 96, height: int = 96, *, hard: bool = False, jp
     rendering = ' shape-rendering="crispEdges"' if hard else ""
     size = f'width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
     image = render_own(f'<svg xmlns="http://www.w3.org/2000/svg" {size}{rendering}>{body}</svg>')
+    return encoded(image.convert("RGB"), "jpeg", quality=jpeg) if jpeg else encoded(image, "png")
+
+
+def encoded(image: Image.Image, kind: str, **options: int) -> FloatArray:
+    """An image as a file of it shows it."""
     data = io.BytesIO()
-    if jpeg:
-        image.convert("RGB").save(data, "JPEG", quality=jpeg)
-    else:
-        image.save(data, "PNG")
+    image.save(data, kind, **options)
     return image_of(data.getvalue())
+
+
+def as_file(image: FloatArray, kind: str = "jpeg", **options: int) -> FloatArray:
+    """Pixels in [0, 1] as a file of them shows them."""
+    return encoded(Image.fromarray(np.round(255 * image).astype(np.uint8)), kind, **options)
+
+
+def decibels(a: FloatArray, b: FloatArray) -> float:
+    """PSNR of pixels in [0, 1]."""
+    return psnr(255 * a, 255 * b)
 
 
 def ground(color: str, width: int = 96, height: int = 96) -> str:

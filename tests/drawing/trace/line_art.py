@@ -11,11 +11,12 @@ from warpsplat.drawing.strokes.lines import trace_ink
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.viewer import render_svg
 
+PEN = 'fill="none" stroke="#000" stroke-width="3" stroke-linecap="round"'
+
 
 def drawn(paths: str, width: int = 96, height: int = 72, ground: str = "#fff") -> FloatArray:
     """A picture of SVG paths, sRGB in [0, 1], shape (height, width, 3)."""
-    pen = '<g fill="none" stroke="#000" stroke-width="3" stroke-linecap="round">'
-    return drawings.draw(f"{drawings.ground(ground, width, height)}{pen}{paths}</g>", width, height)
+    return drawings.draw(f"{drawings.ground(ground, width, height)}<g {PEN}>{paths}</g>", width, height)
 
 
 def traced(image: FloatArray) -> Scene:

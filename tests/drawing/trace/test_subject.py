@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import io
-
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
 
-from tests.drawing.trace.drawings import LOGO, draw, ground, photograph
+from tests.drawing.trace.drawings import LOGO, as_file, draw, ground, photograph
 from warpsplat.drawing.trace.subject import guess_subject
-from warpsplat.files.sources import image_of
 from warpsplat.scene import FloatArray
 
 LINES = ground("#fff") + (
@@ -52,22 +48,23 @@ def small_grey(side: int) -> FloatArray:
     return np.repeat(small.mean(axis=2, keepdims=True), 3, axis=2).astype(np.float32)
 
 
+def stroked(
+    paths: str, width: int, height: int, color: str = "#111", paper: str = "#fff", pen: float = 1.5
+) -> FloatArray:
+    pens = f'<g fill="none" stroke="{color}" stroke-width="{pen}">{paths}</g>'
+    return draw(ground(paper, width, height) + pens, width, height)
+
+
 def icon(side: int) -> FloatArray:
     """A cross in a ring, a quarter of whose pixels are edges."""
-    text = '<circle cx="16" cy="16" r="12"/><path d="M8 16H24M16 8V24"/>'
-    return draw(
-        ground("#fff", side, side) + f'<g fill="none" stroke="#c22" stroke-width="2">{text}</g>', side, side
-    )
+    paths = '<circle cx="16" cy="16" r="12"/><path d="M8 16H24M16 8V24"/>'
+    return stroked(paths, side, side, "#c22", pen=2)
 
 
 def letters() -> FloatArray:
     """Lines of strokes of a pixel and a half, 12 px high."""
     strokes = "".join(f"M{4 + 6 * i} {4 + i % 3}v{10 - 2 * (i % 4)}h{2 + i % 3}" for i in range(30))
-    return draw(
-        ground("#fff", 190, 20) + f'<path d="{strokes}" fill="none" stroke="#111" stroke-width="1.5"/>',
-        190,
-        20,
-    )
+    return stroked(f'<path d="{strokes}"/>', 190, 20)
 
 
 def discs() -> FloatArray:
@@ -89,24 +86,21 @@ def sprite() -> FloatArray:
 
 def table() -> FloatArray:
     """An outline of a table with round corners, on a grid of 8 px: no cells."""
-    text = (
-        '<rect x="12" y="12" width="136" height="136" rx="12" fill="none" stroke="#123" stroke-width="8"/>'
-        '<path d="M12 52H148M12 92H148M52 12V148M92 12V148" fill="none" stroke="#123" stroke-width="8"/>'
-    )
+    lines = '<rect x="12" y="12" width="136" height="136" rx="12"/>'
+    lines += '<path d="M12 52H148M12 92H148M52 12V148M92 12V148"/>'
     discs = "".join(
-        f'<circle cx="{32 + 40 * x}" cy="{32 + 40 * y}" r="10" fill="#123"/>'
+        f'<circle cx="{32 + 40 * x}" cy="{32 + 40 * y}" r="10" fill="#123" stroke="none"/>'
         for x in range(3)
         for y in range(3)
     )
-    return draw(ground("#fff", 160, 160) + text + discs, 160, 160)
+    return stroked(lines + discs, 160, 160, "#123", pen=8)
 
 
 def words_on_shade() -> FloatArray:
     """Thin ink on a plain ground, beside a shaded and grainy disc."""
     image = np.full((160, 240, 3), 0.2, np.float32)
     strokes = "".join(f"M{4 + 6 * i} {4 + 24 * j}v{12 - 2 * (i % 4)}h3" for i in range(22) for j in range(6))
-    text = f'<path d="{strokes}" fill="none" stroke="#fff" stroke-width="2"/>'
-    image[:, :140] = draw(ground("#333", 140, 160) + text, 140, 160)
+    image[:, :140] = stroked(f'<path d="{strokes}"/>', 140, 160, "#fff", "#333", 2)
     disc = np.hypot(*(np.mgrid[:160, :240] - np.array([80, 190])[:, None, None])) < 45
     image[disc] = grainy(photograph(240)[:160], 4)[disc]
     return image
@@ -134,11 +128,7 @@ def page(side: int = 160) -> FloatArray:
     strokes = "".join(
         f"M{6 + 6 * i} {6 + 18 * j}v{10 - 2 * (i % 4)}h{2 + (i + j) % 3}" for i in range(24) for j in range(8)
     )
-    return draw(
-        ground("#fbfbf8", side, side) + f'<path d="{strokes}" fill="none" stroke="#223" stroke-width="1.6"/>',
-        side,
-        side,
-    )
+    return stroked(f'<path d="{strokes}"/>', side, side, "#223", "#fbfbf8", 1.6)
 
 
 def on_checkerboard() -> FloatArray:
@@ -162,12 +152,7 @@ def cut_out() -> FloatArray:
     return np.where(inside[..., None], np.clip(photograph(192) + detail, 0, 1), 1).astype(np.float32)
 
 
-def jpeg(image: FloatArray, quality: int) -> FloatArray:
-    data = io.BytesIO()
-    Image.fromarray(np.round(255 * image).astype(np.uint8)).save(data, "JPEG", quality=quality)
-    return image_of(data.getvalue())
-
-
+SHADE = np.linspace(0.3, 0.9, 96)[:, None, None] * np.ones((96, 96, 3), np.float32)
 PICTURES = {
     "logo": (draw(LOGO), "drawing"),
     "hard": (draw(LARGE, 192, 192, hard=True), "drawing"),
@@ -193,17 +178,14 @@ PICTURES = {
     "page with noise": (grainy(page(), 4), "drawing"),
     "icon with noise": (grainy(icon(32), 4), "drawing"),
     "logo with noise": (grainy(draw(ground("#fff") + LOGO), 4), "drawing"),
-    "page as JPEG": (jpeg(page(), 75), "drawing"),
-    "icon as JPEG": (jpeg(icon(32), 75), "drawing"),
-    "small logo as JPEG": (jpeg(draw(ground("#fff") + LOGO), 75), "drawing"),
+    "page as JPEG": (as_file(page(), quality=75), "drawing"),
+    "icon as JPEG": (as_file(icon(32), quality=75), "drawing"),
+    "small logo as JPEG": (as_file(draw(ground("#fff") + LOGO), quality=75), "drawing"),
     "on a checkerboard": (on_checkerboard(), "drawing"),
     "cut out": (cut_out(), "photo"),
     "cells of many colours": (cells(20, 4, 90), "pixel"),
-    "shaded sky with grain": (
-        grainy(np.linspace(0.3, 0.9, 96)[:, None, None] * np.ones((96, 96, 3)), 4),
-        "photo",
-    ),
-    "even shading": (np.linspace(0.3, 0.9, 96)[:, None, None] * np.ones((96, 96, 3), np.float32), "drawing"),
+    "shaded sky with grain": (grainy(SHADE, 4), "photo"),
+    "even shading": (SHADE, "drawing"),
 }
 
 
@@ -215,5 +197,5 @@ def test_guesses(image: FloatArray, subject: str) -> None:
 
 
 @pytest.mark.parametrize(("side", "subject"), [(16, "pixel"), (17, "photo")])
-def test_what_has_few_pixels_is_no_photograph(side: int, subject: str) -> None:
+def test_tiny_images_are_pixel_art(side: int, subject: str) -> None:
     assert guess_subject(grainy(photograph(side), 4)).subject == subject

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
-from tests.drawing.trace.drawings import LOGO, STAR, draw, ground, photograph
-from warpsplat.drawing.trace.grids import components
-from warpsplat.drawing.trace.palette import Coloring
-from warpsplat.drawing.trace.partition import find_partition
-from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.trace import Traced, trace, trace_partition
+from tests.drawing.trace.drawings import LOGO, STAR, decibels, draw, ground, photograph
+from warpsplat.drawing.trace.seeds import noise_of
+from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.metrics import psnr
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Paint
 from warpsplat.scene.attributes import Joint
 
 
-def decibels(traced: Traced, image: FloatArray) -> float:
+def psnr_of(traced: Traced, image: FloatArray) -> float:
     """PSNR of the exact coverage: the viewer's differs by up to a decibel, by how an arc is written."""
     return psnr(np.round(255 * render(traced.scene)), np.round(255 * image))
 
@@ -36,7 +34,7 @@ def test_a_logo() -> None:
     assert sorted(hex_colors(traced)) == ["2457a8", "ee4266", "ffd23f", "ffffff"]
     assert traced.scene.canvas.background is None
     assert (traced.scene.opacities == 1).all()
-    assert decibels(traced, image) > 39
+    assert psnr_of(traced, image) > 39
     star = hex_colors(traced).index("ffd23f")
     points = slice(traced.scene.first[star], traced.scene.first[star + 1])
     corners = traced.scene.points[points][traced.joints[points] == Joint.CORNER]
@@ -79,6 +77,7 @@ DRAWINGS = {
         35,
         3,
     ),
+    "translucent": ('<rect x="10" y="10" width="60" height="60" fill="#842" fill-opacity="0.5"/>', 45, 1),
     "letters of the ground": (  # on a band on a disc
         ground("#0a3") + '<circle cx="48" cy="48" r="44" fill="#fd0"/><rect x="14" y="30" width="68" '
         'height="36" fill="#fff"/><rect x="40" y="40" width="16" height="16" fill="#0a3"/>',
@@ -92,7 +91,7 @@ DRAWINGS = {
 def test_drawings(body: str, least: float, paths: int) -> None:
     image = draw(body)
     traced = trace(image)
-    assert decibels(traced, image) > least
+    assert psnr_of(traced, image) > least
     assert len(traced.scene) <= paths
     assert (Paint.RADIAL in traced.scene.paint) == ("radialGradient" in body)
     assert (traced.scene.canvas.background is None) == (image.shape[2] == 4)
@@ -105,13 +104,13 @@ def test_pixels_that_are_exact_stay_exact() -> None:
     body += 'fill="#003da5"/><rect x="40" y="20" width="20" height="50" fill="#ffcd00"/>'
     image = draw(body, hard=True)
     traced = trace(image)
-    assert decibels(traced, image) == np.inf
+    assert psnr_of(traced, image) == np.inf
     assert len(traced.scene) == 3
     assert on_outline(traced).sum() <= 20
     assert (traced.joints != Joint.SMOOTH).all() and (traced.joints != Joint.FREE).all()
 
 
-def test_what_lies_below_goes_on_below() -> None:
+def test_lower_shapes_continue_below_upper_ones() -> None:
     """The square is four corners, the disc on its edge cuts nothing out of it."""
     body = ground("#fff") + '<rect x="10" y="20" width="50" height="50" fill="#357"/>'
     traced = trace(draw(body + '<circle cx="60" cy="45" r="18" fill="#e94"/>'))
@@ -122,25 +121,24 @@ def test_what_lies_below_goes_on_below() -> None:
     assert traced.scene.point_counts()[disc] == 12
 
 
-def test_translucent_regions_keep_their_opacity() -> None:
-    image = draw('<rect x="10" y="10" width="60" height="60" fill="#804020" fill-opacity="0.5"/>')
-    traced = trace(image)
-    assert len(traced.scene) == 1
-    assert traced.scene.opacities[0] == pytest.approx(0.5, abs=0.01)
-    assert decibels(traced, image) > 45
-
-
 @pytest.mark.parametrize("most", [1, 2, 3])
 def test_a_limit_of_paths(most: int) -> None:
-    traced = trace(draw(LOGO), most=most)
-    assert 1 <= len(traced.scene) <= most
+    assert 1 <= len(trace(draw(LOGO), most=most).scene) <= most
 
 
-@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 9, 4), (3, 3, 4)])
+def test_photographs_are_traced_too() -> None:
+    """By mistake, but to an end."""
+    traced = trace(photograph(), most=40)
+    assert len(traced.scene) <= 40
+    assert psnr_of(traced, photograph()) > 12
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 3), (2, 9, 4), (3, 3, 4), (4, 4, 3)])
 def test_the_smallest_pictures(shape: tuple[int, ...]) -> None:
     image = np.random.default_rng(0).random(shape).astype(np.float32)
     image[..., :3] *= image[..., 3:] if shape[2] == 4 else 1
-    traced = trace(image)
+    with np.errstate(all="raise"):  # around one pixel an outline has no direction
+        traced = trace(image)
     assert len(traced.joints) == len(traced.scene.points)
     assert np.isfinite(traced.scene.points).all()
 
@@ -152,41 +150,7 @@ def test_one_colour_and_nothing() -> None:
     assert len(empty.scene) == 0 and empty.scene.canvas.background is None
 
 
-def test_photographs_are_traced_too() -> None:
-    """By mistake, but to an end."""
-    image = photograph()
-    traced = trace(image, most=40)
-    assert len(traced.scene) <= 40
-    assert decibels(traced, image) > 12
-
-
-def test_regions_of_single_pixels_are_traced() -> None:
-    """Around one pixel an outline has no direction."""
-    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 200, 255]], np.float32)
-    painted = np.random.default_rng(0).integers(0, 3, (4, 4)).astype(np.int32)
-    image = palette[painted]
-    labels, paint = components(painted, image)
-    regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
-    with np.errstate(all="raise"):
-        traced = trace_partition(find_partition(regions))
-    assert np.isfinite(traced.scene.points).all()
-
-
-def test_a_ground_is_the_canvas_although_a_seed_was_given_up() -> None:
-    """A colouring that no region has says nothing of opacity."""
-    painted = np.zeros((12, 12), np.int32)
-    painted[3:9, 3:9] = 1
-    palette = np.array([[255, 255, 255, 255], [200, 0, 0, 255], [0, 0, 0, 0]], np.float32)
-    image = palette[painted]
-    regions = Regions(
-        image, painted, image, np.arange(2, dtype=np.int32), [Coloring(c) for c in palette], 0.0
-    )
-    scene = trace_partition(find_partition(regions)).scene
-    assert scene.canvas.background is not None
-    assert len(scene) == 1
-
-
-def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them() -> None:
+def test_hidden_parts_do_not_show_through_gaps() -> None:
     image = np.zeros((64, 64, 4), np.float32)
     image[6:58, 6:58] = 0.1, 0.1, 0.1, 1
     image[10:54, 10:54, :3] = 0.9, 0.2, 0.1
@@ -196,7 +160,7 @@ def test_what_lies_under_several_shapes_is_not_seen_through_a_gap_between_them()
     assert render(trace(image).scene)[28:36, 28:42, 3].max() < 0.01
 
 
-def test_what_lies_in_a_bay_of_a_higher_line_is_seen() -> None:
+def test_visible_parts_in_concave_outlines_are_kept() -> None:
     """Three lines go round a square, the innermost below the others: the shortest way under the square from
     one end of the outer line to the other would cover it."""
     image = np.ones((96, 96, 3), np.float32)
@@ -205,4 +169,66 @@ def test_what_lies_in_a_bay_of_a_higher_line_is_seen() -> None:
     image[30:79, 17:79] = (0.9, 0.6, 0.1)
     image[10:73, 23:73] = 0.3
     traced = trace(image)
-    assert psnr(255 * render(traced.scene)[..., :3], 255 * image) > 40
+    assert psnr_of(traced, image) > 40
+
+
+def square(top: int, bottom: int, left: int, right: int, value: float) -> FloatArray:
+    """A square on nothing, 96 px."""
+    shade = np.zeros((96, 96), np.float32)
+    shade[top:bottom, left:right] = value
+    return shade
+
+
+@pytest.mark.parametrize(
+    ("shade", "place", "color"),
+    [
+        (cv2.GaussianBlur(square(24, 80, 20, 76, 0.5), (0, 0), 4), np.s_[20:72, 20:76], (0.2, 0.4, 0.9)),
+        (cv2.GaussianBlur(square(28, 76, 24, 72, 0.6), (0, 0), 6), np.s_[24:72, 24:72], (0.98, 0.98, 0.98)),
+    ],
+)
+def test_a_soft_shadow_is_a_few_bands(
+    shade: FloatArray, place: tuple[slice, slice], color: tuple[float, ...]
+) -> None:
+    """Cuts that gain nothing at first are made: the halves of a ring of shade are no nearer to a gradient."""
+    tone = np.repeat(1 - shade[..., None], 3, axis=2)
+    tone[place] = color
+    image = np.round(tone * 255).astype(np.float32) / 255
+    scene = trace(image).scene
+    assert 6 <= len(scene) <= 30
+    assert decibels(render(scene), image) > 36  # a single gradient reaches 28
+
+
+def test_shading_of_many_hues_is_not_cut_into_patches() -> None:
+    y, x = np.mgrid[:64, :64] / np.float32(64)
+    image = np.round(np.stack([1 - x / 2, 0.5 + y / 2, x / 3], axis=2) * 255).astype(np.float32) / 255
+    assert len(trace(image).scene) <= 2
+
+
+def test_a_shadow_that_fades_away_is_kept() -> None:
+    """On a transparent ground, where it goes over into nothing."""
+    shade = square(40, 80, 20, 76, 0.5)
+    image = np.zeros((96, 96, 4), np.float32)
+    image[..., 3] = np.round(cv2.GaussianBlur(shade, (0, 0), 5) * 255) / 255
+    image[20:64, 20:76] = (0.2, 0.4, 0.9, 1)
+    shown = render(trace(image).scene)
+    assert shown.shape[2] == 4
+    assert np.sqrt(np.square(255 * (shown - image)[..., 3]).mean()) < 3
+    assert shown[:8].max() == 0, "nothing is painted where nothing was"
+
+
+def test_a_slope_and_a_map_have_no_noise_but_grain_is() -> None:
+    """Of a map every pixel is beside an edge, and some of its steps are small."""
+    rng = np.random.default_rng(0)
+    colors = np.array([(90, 30, 20), (100, 120, 30), (110, 150, 60)], np.float32)
+    ramp = np.round(np.broadcast_to(np.linspace(0, 240, 80)[:, None, None], (80, 80, 3)))
+    for plain in (ramp, colors[rng.integers(0, 3, (80, 80))]):
+        image = np.concatenate([plain, np.full((80, 80, 1), 255)], axis=2).astype(np.float32)
+        assert noise_of(image) < 1
+        image[..., :3] += np.round(rng.normal(0, 4, (80, 80, 1)))
+        assert noise_of(image) > 3
+    coarse = np.kron(2 * rng.integers(0, 2, (40, 40)), np.ones((2, 2)))
+    image[..., :3] = 100 + coarse[..., None]  # steps of a scaled picture differ by no more than they are
+    assert noise_of(image) == 2
+    opacity = rng.normal(128, 6, (80, 80, 1)).astype(np.float32)
+    assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white
+    assert noise_of(np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)) > 1

@@ -23,12 +23,6 @@ def scene_of(name: str) -> Scene:
     return random_scene(kind, count=6, seed=6, basis=Basis.SPLINE if "splined" in name else Basis.CUBIC)
 
 
-def by_shape(scene: Scene, values: torch.Tensor) -> np.ndarray:
-    """Sums over each shape's Béziers."""
-    ends = np.cumsum(scene.bezier_counts())
-    return np.array([part.sum() for part in np.split(values.detach().numpy(), ends[:-1])])
-
-
 def launch(kernel: wp.Kernel, scene: Scene, device: str, weight: float) -> tuple[np.ndarray, np.ndarray]:
     """(gradient of the points, loss of each shape)."""
     parameters = Parameters(scene, Backend.on(device))
@@ -45,7 +39,8 @@ def test_bending(device: str, name: str) -> None:
     x = torch.tensor(scene.points, dtype=torch.float64, requires_grad=True)
     energy = losses.bending(scene, x)
     (0.7 * energy.sum()).backward()
-    np.testing.assert_allclose(each, by_shape(scene, energy), rtol=1e-4, atol=1e-9)
+    parts = np.split(energy.detach().numpy(), np.cumsum(scene.bezier_counts())[:-1])
+    np.testing.assert_allclose(each, [part.sum() for part in parts], rtol=1e-4, atol=1e-9)
     assert x.grad is not None
     assert relative_error(got, x.grad.numpy()) < 1e-4
 
