@@ -90,31 +90,29 @@ class CheckpointFile:
             log.warning("%s: no checkpoint exists yet: starts from the beginning", self.path)
 
         def write(content: Content) -> None:
-            header = {"version": __version__, "device": device, "run": run, **content.numbers}
+            whole = {"version": __version__, "device": device, "run": run, **content}
             try:
-                write_atomically(self.path, pack(header, content.arrays))
+                write_atomically(self.path, pack(whole))
             except OutputError as error:  # a failed save must not end hours of work
                 log.warning("%s; the run continues without this checkpoint", error)
 
-        checkpoint = Checkpoint(str(self.path), write, self.every, saved)
+        checkpoint = Checkpoint(write, self.every, saved)
         if saved and checkpoint.is_empty:
             log.warning("%s: nothing to resume from: starts from the beginning", self.path)
         return checkpoint
 
     def _read(self, run: Mapping[str, Any], device: str) -> Content:
-        header, arrays = unpack(self.path)
-        if header.get("version") != __version__:
-            made = str(header.get("version"))[:20]
-            raise UsageError(f"{self.path}: made by warpsplat {made}, this is {__version__}")
-        before = header.get("run")
-        for name, was, now in differences(before if isinstance(before, dict) else {}, run):
+        saved = unpack(self.path)
+        if saved["version"] != __version__:
+            raise UsageError(f"{self.path}: made by warpsplat {saved['version']}, this is {__version__}")
+        for name, was, now in differences(saved["run"], run):
             detail = f" ({was}, now {now})" if name not in DIGESTS else ""
             raise UsageError(f"{self.path}: belongs to another run: {name} differs{detail}")
-        if header.get("device") != device:
+        if saved["device"] != device:
             log.warning(
                 "%s: was made on another device; the run continues, but its bytes will differ", self.path
             )
-        return Content(header, arrays)
+        return saved
 
 
 def open_checkpoint(
