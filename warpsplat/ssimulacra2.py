@@ -9,8 +9,6 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 
 SCALES = 6
-SMALLEST_SIDE = 8
-"""Smallest side of a scale [px]."""
 
 SIGMA, RADIUS = 1.5, 5
 """Gaussian window [px]."""
@@ -63,7 +61,8 @@ def ssimulacra2(a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8]) -> float | N
     """
     linear = [_linear_table()[image] for image in (a, b)]
     scales: list[npt.NDArray[np.float64]] = []
-    while len(scales) < SCALES and min(linear[0].shape[:2]) >= SMALLEST_SIDE:
+    smallest_side = 8  # smallest side of a scale [px]
+    while len(scales) < SCALES and min(linear[0].shape[:2]) >= smallest_side:
         scales.append(_differences(*map(_opponent_colors, linear)))
         linear = [_halved(image) for image in linear]
     if not scales:

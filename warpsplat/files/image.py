@@ -43,10 +43,6 @@ MAX_PIXELS = 120_000_000
 
 TOO_LARGE = f"more than {MAX_PIXELS / 1e6:g} million pixels"
 
-BOMB_PIXELS = 16_000_000
-PIXELS_A_BYTE = 10_000
-"""Larger images with more pixels a byte are bombs, or blank: drawings in two colours have a tenth of that."""
-
 STRIP_PIXELS = 1 << 20
 """Pixels that are converted at a time."""
 
@@ -70,11 +66,14 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
     Raises:
         ImageError: As ``files.sources.image_of``.
     """
+    bomb_pixels = 16_000_000
+    # Larger images with more pixels a byte are bombs, or blank: drawings in two colours have a tenth of that.
+    pixels_a_byte = 10_000
     try:
         with _opened(source) as image:
             width, height = image.size
             check_size(width, height)
-            if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
+            if width * height > max(bomb_pixels, pixels_a_byte * len(source)):
                 raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
             _check_covered(image)
             rawmode = _rawmode(image)

@@ -18,17 +18,15 @@ HALF = "\N{UPPER HALF BLOCK}"
 CUBE = (48, 115, 155, 195, 235)
 """Levels between those of xterm's 6x6x6 cube of colours, which are 0, 95, 135, 175, 215 and 255."""
 
-FIRST_COLOR = 16
-"""Number of the cube's first colour; those before it differ between terminals."""
-
 
 def half_blocks(pixels: Pixels, *, true_color: bool) -> list[str]:
     """Return lines of characters with two pixels each: foreground above, background below."""
+    first_color = 16  # number of the cube's first colour; those before it differ between terminals
     if true_color:
         names = [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
     else:
         red, green, blue = np.moveaxis(np.digitize(pixels, CUBE), 2, 0)
-        names = [[f"5;{color}" for color in row] for row in FIRST_COLOR + 36 * red + 6 * green + blue]
+        names = [[f"5;{color}" for color in row] for row in first_color + 36 * red + 6 * green + blue]
     lines = []
     for upper, lower in zip(names[::2], names[1::2], strict=True):
         styles = ["", *(f"\x1b[38;{top};48;{bottom}m" for top, bottom in zip(upper, lower, strict=True))]

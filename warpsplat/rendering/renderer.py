@@ -31,8 +31,6 @@ SLOT_LIMIT = 1_500_000
 """Most slots before a scene is refused: 1.3 KiB each, 2.4 for strokes, and 1 more on a GPU; up to 5 GiB."""
 SAMPLE_LIMIT = 16_000_000
 """Most Gaussians or vertices (about 120 bytes each, 200 with styled strokes) before a scene is refused."""
-SLOTS_PER_SHAPE = 8
-"""First guess of the need, besides one for each tile."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +96,9 @@ class Renderer:
         self.needed_samples, self.needed_slots = self._needed[:1], self._needed[1:]
         self._needed_on_host = self._needed.numpy() if self.backend.device.is_cpu else None
         shapes = parameters.shape_count
+        slots_per_shape = 8  # first guess of the need, besides one for each tile
         first_guess = Capacity(
-            model.samples_per_shape * shapes, viewport.tile_count + SLOTS_PER_SHAPE * shapes
+            model.samples_per_shape * shapes, viewport.tile_count + slots_per_shape * shapes
         )
         self._build(capacity or first_guess)
 

@@ -44,12 +44,6 @@ from warpsplat.svg.write import minified, shortened, write_svg
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-MIN_ALIKE = 25.0
-"""Least PSNR [dB] of the scene that was read against the SVG; one that was read in full has over 40."""
-
-REFINE_RATE = 0.5
-"""Learning rate of points [px]: the shapes are nearly where they should be."""
-
 
 @takes(RefineOptions)
 def refine(
@@ -186,12 +180,13 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
 
 def _settings(settings: Settings, count: int) -> Settings:
     """Return the settings of a fit of ``count`` shapes that all stay."""
+    refine_rate = 0.5  # learning rate of points [px]: the shapes are nearly where they should be
     return replace(
         settings,
         curves=min(count, 100_000),
         coarse=0.0,
         density=Density(interval=0),
-        rates={**settings.rates, "points": REFINE_RATE},
+        rates={**settings.rates, "points": refine_rate},
         renderer="exact",
         texture=0.0,  # the unweighted loss decides whether a result is better
     )
@@ -236,5 +231,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
         a, b = (on_white(each.crop((0, rows.start, given.width, rows.stop))) for each in (given, read))
         error += float(np.square(a - b).sum())
     alike = decibels(error / (3 * given.width * given.height))
-    if alike < MIN_ALIKE:
+    # Least PSNR [dB] of the scene that was read against the SVG; one that was read in full has over 40.
+    min_alike = 25.0
+    if alike < min_alike:
         raise ImageError(f"contains something that is not supported ({alike:.1f} dB from what could be read)")

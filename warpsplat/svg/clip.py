@@ -27,9 +27,6 @@ TOLERANCE = 1e-6
 NEAR_END = 1e-9
 """Cubics are not cut closer to their ends than this, in their parameter."""
 
-OVERLAP_SHAPES = 2000
-"""Most shapes of a group that are compared with each other."""
-
 EDGE = 1e-3
 """Overlap [px] of boxes that still counts as touching."""
 
@@ -38,7 +35,8 @@ def overlap(shapes: list[Shape]) -> bool:
     """Return whether the boxes of shapes overlap."""
     if len(shapes) < 2:
         return False
-    if len(shapes) > OVERLAP_SHAPES:
+    overlap_shapes = 2000  # most shapes of a group that are compared with each other
+    if len(shapes) > overlap_shapes:
         return True
     boxes = np.stack([shape.box() for shape in shapes])
     low, high = boxes[:, 0] + EDGE, boxes[:, 1] - EDGE

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 CURVES = ("arcs", "splines", "lines", "r12")
 """How curves are written: as arcs of polylines, as exact splines, as lines, as lines in the old version."""
 
-MILLIMETRES = 25.4
-"""Millimetres in an inch."""
-
 TOLERANCE = 1 / 20_000
 """Largest distance of arcs and lines from curves, over the page's longer side."""
 
@@ -33,8 +30,6 @@ ROUND = 2.8e-4
 
 DECIMALS = 6
 """Decimals of coordinates [mm]."""
-
-BULGE_DECIMALS = 9
 
 NOTHING = 1e-6
 """Length of curves that are left out [mm]."""
@@ -75,7 +70,8 @@ def _document(text: str, curves: str, zoom: float) -> Drawing:
     from ezdxf import units
     from ezdxf.document import Drawing
 
-    page = drawn_on_page(text, MILLIMETRES * zoom, background=False)
+    millimetres = 25.4  # millimetres in an inch
+    page = drawn_on_page(text, millimetres * zoom, background=False)
     document = Drawing.new(OLD_VERSION if curves == "r12" else VERSION)
     if curves != "r12":  # which has no units
         document.units = units.MM
@@ -142,7 +138,8 @@ def _draw(
         _draw_spline(space, chain, closed, attributes)
         return
     made = as_arcs(chain, tolerance) if curves == "arcs" else straight
-    points, bulges = _rounded(made.points), [*np.round(made.bulges, BULGE_DECIMALS).tolist(), 0.0]
+    bulge_decimals = 9
+    points, bulges = _rounded(made.points), [*np.round(made.bulges, bulge_decimals).tolist(), 0.0]
     if closed:
         points, bulges = points[:-1], bulges[:-1]
     vertices = [(x, y, bulge) for (x, y), bulge in zip(points, bulges, strict=True)]

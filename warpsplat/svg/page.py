@@ -50,9 +50,6 @@ SIZE = re.compile(
 )
 """A width, a height after an x, or both; and a unit."""
 
-DECIMALS = 3
-"""Decimals of boxes."""
-
 DIGITS, MOST_DECIMALS = 6, 12
 """Significant digits of sizes, and how many of them may be decimals."""
 
@@ -173,12 +170,9 @@ def _attributes(sheet: Sheet) -> str:
 
 def _with_head(text: str, size: str, view: Iterable[float]) -> str:
     """Return the file with other attributes for its size and another view box."""
-    box = " ".join(number(value, DECIMALS) for value in view)
+    decimals = 3  # decimals of boxes
+    box = " ".join(number(value, decimals) for value in view)
     return f'<svg xmlns="{NAMESPACE}" {size} viewBox="{box}">{text[own_head(text).end() :]}'
-
-
-PROPORTIONS = 0.02
-"""Largest relative difference between the proportions of a picture on a sheet and those of an image."""
 
 
 def picture_view(svg: str, width: int, height: int) -> str | None:
@@ -196,7 +190,9 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
     low = max(space - 1 / side for space, side in spaces)
     high = min(space + 1 / side for space, side in spaces)
     middle = (low + high) / 2
-    if low > (1 + PROPORTIONS) * high or middle <= 0:
+    # Largest relative difference between the proportions of a picture on a sheet and those of an image.
+    proportions = 0.02
+    if low > (1 + proportions) * high or middle <= 0:
         return None
     known = [grid for grid in GRIDS if low <= grid <= high]
     units = min(known, key=lambda grid: abs(grid - middle)) if known else middle

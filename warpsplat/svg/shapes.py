@@ -221,17 +221,14 @@ def _check(place: Placement, subpaths: list[Subpath], line: LineStyle | None) ->
         raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
 
 
-BETWEEN_PIXELS = 1e-3
-"""Distance [px] from pixel edges within which antialiasing changes nothing."""
-
-
 def _is_of_pixels(subpaths: list[Subpath]) -> bool:
     """Return whether all outlines run along pixel edges."""
+    between_pixels = 1e-3  # distance [px] from pixel edges within which antialiasing changes nothing
     for subpath in subpaths:
         ends = subpath.points[::3]
         steps = np.diff(subpath.points, axis=0, append=subpath.points[:1])
         gaps = [*np.abs(steps).min(axis=1), *np.abs(ends - np.round(ends)).ravel()]
-        if not np.max(gaps) <= BETWEEN_PIXELS:
+        if not np.max(gaps) <= between_pixels:
             return False
     return True
 

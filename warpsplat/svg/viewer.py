@@ -99,8 +99,12 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
     """Return the output of ``draw_child`` for ``text``, under limits for a picture of so many ``pixels``."""
     if not pixels <= MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
-    memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
+    cpu_per_byte = 5e-6
+    cpu_per_pixel = 1.2e-7  # bounds of the processor time [s]: three times what large plain drawings take
+    seconds = round(CPU_SECONDS + cpu_per_byte * len(text) + cpu_per_pixel * pixels)
+    memory_per_byte = 100
+    memory_per_pixel = 12  # bounds of the address space [bytes]: three layers, and 100 times the text
+    memory = round(MEMORY + memory_per_byte * len(text) + memory_per_pixel * pixels)
     options = {**options, "skip_system_fonts": TEXT.search(text) is None}
     limits = {"seconds": seconds, "memory": memory}
     request = {"path": sys.path, **limits, "form": form, "options": options}
@@ -132,15 +136,9 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
 
 
 CPU_SECONDS = 4.0
-CPU_PER_BYTE = 5e-6
-CPU_PER_PIXEL = 1.2e-7
-"""Bounds of the processor time [s]: three times what large plain drawings take."""
 WALL_FACTOR = 3
 """Ratio of the bound of wall-clock time to that of processor time."""
 MEMORY = 3 << 29
-MEMORY_PER_BYTE = 100
-MEMORY_PER_PIXEL = 12
-"""Bounds of the address space [bytes]: three layers, and 100 times the text."""
 LIMIT_SIGNALS = (9, 24)
 """SIGKILL and SIGXCPU, which end a process at its limit of processor time."""
 
