@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.field_docs import described
+from warpsplat.native import STRIP_PIXELS
 from warpsplat.portable import elementary
 from warpsplat.ssimulacra2 import ssimulacra2
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.viewer import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
+from warpsplat.svg.viewer import WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 

@@ -22,7 +22,7 @@ from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.plugins import PLUGINS, plugin_formats
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.files.resolution import SWAPPED, Resolution, resolution_of
-from warpsplat.native import messages_hidden
+from warpsplat.native import STRIP_PIXELS, messages_hidden
 from warpsplat.portable.filters import boxed
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray
@@ -42,9 +42,6 @@ MAX_PIXELS = 120_000_000
 """Largest image [pixels], that of the largest cameras."""
 
 TOO_LARGE = f"more than {MAX_PIXELS / 1e6:g} million pixels"
-
-STRIP_PIXELS = 1 << 20
-"""Pixels that are converted at a time."""
 
 WEBP_SIDE = 16_383
 """Longest side of a WebP [px]: its header has 14 bits for it."""

@@ -46,10 +46,10 @@ _temporary: list[str] = []
 
 
 _expected: list[_Build] = []
-"""What was announced and is not yet being compiled."""
+"""Builds that were announced and have not begun."""
 
 _builds: dict[Path, Future[None]] = {}
-"""What is being compiled, by the files that it makes."""
+"""Builds under way, by the files that they make."""
 
 _loading = threading.RLock()
 """One thread at a time loads, or asks for modules to be compiled."""

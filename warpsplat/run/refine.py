@@ -18,7 +18,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import for_machines, show
 from warpsplat.fit.loop import fit
 from warpsplat.fit.objective import loss_of_file
-from warpsplat.fit.problem import Problem, Run, Start
+from warpsplat.fit.problem import Fit, Problem, Run, Start
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
@@ -131,15 +131,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     judged = problem.loss or settings.loss != "l2"  # on the device
     if run.failures and (judged or not made.iterations):
         raise run.failures[0]
+    made = _cleared(made, problem, run)
     refined = made.scene
-    if target.shape[2] == 4 and not made.interrupted:
-        try:
-            with failures_of(run.backend.device):
-                refined = clear_empty(refined, target, settings, run, made.per_pixel)
-            made = replace(made, interrupted=run.stopped())
-        except DeviceError as failure:
-            run.failures.append(failure)
-            made = replace(made, interrupted=True)
     if checkpoint and made.interrupted:
         checkpoint.save()
     release_memory()
@@ -176,6 +169,19 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
         before=before.psnr,
         kept=base.kept,
     )
+
+
+def _cleared(made: Fit, problem: Problem, run: Run) -> Fit:
+    """Return a fit whose outlines are drawn back from where the image is empty, unless the device fails."""
+    if problem.target.shape[2] != 4 or made.interrupted:
+        return made
+    try:
+        with failures_of(run.backend.device):
+            scene = clear_empty(made.scene, problem.target, problem.settings, run, made.per_pixel)
+        return replace(made, scene=scene, interrupted=run.stopped())
+    except DeviceError as failure:
+        run.failures.append(failure)
+        return replace(made, interrupted=True)
 
 
 def _settings(settings: Settings, count: int) -> Settings:

@@ -22,7 +22,7 @@ import resvg_py
 from PIL import Image, PngImagePlugin
 
 from warpsplat.errors import ImageError, ResourceError, Stopped, cause_of
-from warpsplat.native import available_cores
+from warpsplat.native import STRIP_PIXELS, available_cores
 from warpsplat.svg import draw_child
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 from warpsplat.svg.write import OUR_HEAD, resized
@@ -159,9 +159,6 @@ def premultiplied(image: Image.Image) -> Pixels:
 
 Bytes = npt.NDArray[np.uint8]
 Stop = Callable[[], bool]
-
-STRIP_PIXELS = 1 << 20
-"""Pixels of a strip."""
 
 WHOLE_PIXELS = 1 << 22
 """Largest SVG that is drawn in one piece [pixels]. In strips, edges move by thousandths of a pixel, because a

@@ -48,7 +48,7 @@ class Control:
 
     @property
     def hint(self) -> str:
-        """What an empty value means."""
+        """The meaning of an empty value."""
         return self.words.get("", self.option.default_text or "any")
 
     @functools.cached_property
