@@ -19,7 +19,7 @@ import warpsplat
 from tests.scenes import contours_scene, mixed_scene, picture_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.run.result import LevelScore
-from warpsplat.scene import Canvas, Kind, Picture, Rule, Scene
+from warpsplat.scene import Canvas, KeptPicture, Kind, Rule, Scene
 from warpsplat.svg.viewer import render_svg
 
 PIXELS = np.random.default_rng(0).uniform(0, 1, (24, 32, 3))
@@ -27,7 +27,7 @@ PIXELS = np.random.default_rng(0).uniform(0, 1, (24, 32, 3))
 
 def pictured() -> Scene:
     canvas = Canvas(20, 10, None)
-    return picture_scene(canvas, Picture("<g/>", (20, 10), (2, 3), np.full((4, 5, 4), 0.5, np.float32)))
+    return picture_scene(canvas, KeptPicture("<g/>", (20, 10), (2, 3), np.full((4, 5, 4), 0.5, np.float32)))
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ DESCRIBED = (
         warpsplat.Suggestion,
         warpsplat.Scene,
         warpsplat.Canvas,
-        Picture,
+        KeptPicture,
         warpsplat.CustomLoss,
     ),
 )

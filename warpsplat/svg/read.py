@@ -23,9 +23,9 @@ from warpsplat.scene import (
     Cap,
     FloatArray,
     Join,
+    KeptPicture,
     Kind,
     Paint,
-    Picture,
     Rule,
     Scene,
     Spread,
@@ -174,7 +174,7 @@ def _paints(shapes: list[Shape]) -> dict[str, Any]:
         raise ImageError(f"its gradients add up to more than {MAX_STOPS} stops")
     stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
     kinds = [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps]
-    is_picture = np.array([isinstance(paint, Picture) for paint in paints], np.bool_)
+    is_picture = np.array([isinstance(paint, KeptPicture) for paint in paints], np.bool_)
     flat = [paint.color if isinstance(paint, FlatColor) else (0.0, 0.0, 0.0) for paint in paints]
     return {
         "colors": np.array(flat, np.float32).reshape(-1, 3),
@@ -189,7 +189,7 @@ def _paints(shapes: list[Shape]) -> dict[str, Any]:
         "stop_colors": np.array([stop.color for stop in stops], np.float32).reshape(-1, 3),
         "stop_opacities": np.array([stop.opacity for stop in stops], np.float32),
         "picture": np.where(is_picture, np.cumsum(is_picture) - 1, NO_PICTURE).astype(np.int32),
-        "pictures": tuple(paint for paint in paints if isinstance(paint, Picture)),
+        "pictures": tuple(paint for paint in paints if isinstance(paint, KeptPicture)),
     }
 
 
@@ -264,7 +264,7 @@ def load_kept(
     )
 
 
-def _in_words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:
+def _in_words(kept: Sequence[Kept], pictures: Sequence[KeptPicture] = ()) -> str:
     """Return which elements are kept and why, in one line."""
     counts: Counter[str] = Counter()
     for one in kept:
@@ -341,7 +341,7 @@ def _picture_shape(markup: str, size: tuple[float, float], pixels: FloatArray) -
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     top, bottom = (rows[0], rows[-1] + 1) if len(rows) else (0, 1)
     left, right = (columns[0], columns[-1] + 1) if len(columns) else (0, 1)
-    picture = Picture(markup, size, (int(top), int(left)), pixels[top:bottom, left:right].copy())
+    picture = KeptPicture(markup, size, (int(top), int(left)), pixels[top:bottom, left:right].copy())
     low, high = np.array([left, top]) - MARGIN, np.array([right, bottom]) + MARGIN
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])], np.float64)
     return Shape([polygon(corners)], picture, 1.0, None, Rule.NONZERO)

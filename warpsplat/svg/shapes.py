@@ -14,7 +14,7 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.portable.linear import determinant
-from warpsplat.scene import Cap, Join, Picture, Rule
+from warpsplat.scene import Cap, Join, KeptPicture, Rule
 from warpsplat.svg.css import ANIMATED
 from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
@@ -50,7 +50,7 @@ class Shape:
     """One fill or stroke, in canvas units."""
 
     subpaths: list[Subpath]
-    paint: Colouring | Picture
+    paint: Colouring | KeptPicture
     opacity: float
     """A factor on the paint's opacity."""
     line: LineStyle | None

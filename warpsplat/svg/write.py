@@ -20,9 +20,9 @@ from warpsplat.scene import (
     Cap,
     FloatArray,
     Join,
+    KeptPicture,
     Kind,
     Paint,
-    Picture,
     Rule,
     Scene,
 )
@@ -184,7 +184,7 @@ def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     return np.array(sizes, np.int64)
 
 
-def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
+def _picture(picture: KeptPicture, scene: Scene, per_pixel: float) -> str:
     """Return the markup of a picture, in the file's units."""
     across = per_pixel * scene.canvas.width / picture.size[0]
     down = per_pixel * scene.canvas.height / picture.size[1]
