@@ -25,8 +25,6 @@ OPSIN = np.array(
 )
 """Matrix from linear sRGB to the responses of the eye's cones, as in JPEG XL."""
 
-OPSIN_BIAS = 0.0037930732552754493
-
 XYB = np.array([[7.0, -7.0, 0.0], [0.5, 0.5, 0.0], [-0.5, -0.5, 1.0]])
 XYB_OFFSET = np.array([0.42, 0.01, 0.55])
 """From the cube roots of the responses to opponent colours that are positive."""
@@ -82,9 +80,10 @@ def _linear_table() -> Floats:
 
 def _opponent_colors(linear: Floats) -> Floats:
     """Return an image in positive XYB, shape (height, width, 3)."""
-    cones = cv2.transform(linear, np.column_stack([OPSIN, np.full(3, OPSIN_BIAS)]))
+    opsin_bias = 0.0037930732552754493
+    cones = cv2.transform(linear, np.column_stack([OPSIN, np.full(3, opsin_bias)]))
     roots = np.cbrt(np.maximum(cones, 0))
-    offset = XYB_OFFSET - XYB.sum(axis=1) * np.cbrt(OPSIN_BIAS)
+    offset = XYB_OFFSET - XYB.sum(axis=1) * np.cbrt(opsin_bias)
     return np.asarray(cv2.transform(roots, np.column_stack([XYB, offset])), np.float32)
 
 

@@ -35,9 +35,6 @@ FORMATS = (
 programs (EPS, which it passes to Ghostscript), drawings (WMF), containers of other formats (IPTC), or rare.
 """
 
-MIN_SIDE = 2
-"""Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
-
 MAX_PIXELS = 120_000_000
 """Largest image [pixels], that of the largest cameras."""
 
@@ -94,8 +91,9 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
 
 def check_size(width: int, height: int) -> None:
     """Raise ``ImageError`` for an image of too few or too many pixels."""
-    if min(width, height) < MIN_SIDE:
-        raise ImageError(f"{width}x{height} pixels; at least {MIN_SIDE}x{MIN_SIDE} are needed")
+    min_side = 2  # smallest side of an image [px]: with one pixel there is nothing to fit a shape to
+    if min(width, height) < min_side:
+        raise ImageError(f"{width}x{height} pixels; at least {min_side}x{min_side} are needed")
     if width * height > MAX_PIXELS:
         raise ImageError(TOO_LARGE)
 

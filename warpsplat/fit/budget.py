@@ -16,9 +16,6 @@ from warpsplat.portable import elementary
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.scene import Basis, FloatArray, Kind
 
-TIMED_STEPS = 4
-"""Steps that are timed at each size."""
-
 BUDGET_MARGIN = 1.25
 """Time of a step with its update and its share of densification, over the time measured without."""
 
@@ -51,11 +48,12 @@ class Budget:
         self, state: FitState, settings: Settings, image: FloatArray, loss: CustomLoss | None = None
     ) -> Settings:
         """Time a few steps at each size without updates; return ``settings`` with as many steps as fit."""
+        timed_steps = 4  # steps that are timed at each size
         for phase in phases(settings, image.shape[1], image.shape[0]):
             step = Step(state, settings, Target(image, phase, loss=loss))
             begin = time.monotonic()
-            step.time(TIMED_STEPS)
-            self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)
+            step.time(timed_steps)
+            self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / timed_steps)
         self._began, self._compiled = time.monotonic(), compile_seconds()
         return self._fit(settings, 0, 1.0)
 

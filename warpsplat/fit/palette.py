@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from warpsplat.fit.state import FitState
     from warpsplat.fit.step import Step
 
-MIN_VISIBLE = 1e-6
-"""Minimum sum of a shape's squared visibility [pixels] at which it chooses a colour."""
-
 SOLID_OPACITY = 0.5
 """Minimum opacity of a pixel whose colour counts, and of a shape that is kept where all are made opaque."""
 
@@ -115,9 +112,10 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
     pulls = residual.sum(axis=(2, 3))
     total = np.bincount(seen.shape, weights=squares, minlength=len(scene))
     colors = scene.colors.copy()
+    min_visible = 1e-6  # minimum sum of a shape's squared visibility [pixels] at which it chooses a colour
     for channel in range(3):
         pull = np.bincount(seen.shape, weights=pulls[:, channel], minlength=len(scene))
-        colors[:, channel] += np.where(total > MIN_VISIBLE, pull / np.maximum(total, MIN_VISIBLE), 0)
+        colors[:, channel] += np.where(total > min_visible, pull / np.maximum(total, min_visible), 0)
     return colors
 
 

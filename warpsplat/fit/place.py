@@ -14,9 +14,6 @@ from warpsplat.forms import form_of
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
-GRID_JITTER = 0.25
-"""Maximum offset of a first shape along each axis, in cells of the grid."""
-
 STROKE_CUBICS, STROKE_ASPECT = 3, 3.0
 """Cubics in a new stroke (paper section 3.2, as in DiffVG), and its length over its width."""
 
@@ -53,7 +50,8 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
     y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
     cell = np.sqrt(width * height / count)
-    centres = np.stack([x, y], axis=1) + rng.uniform(-GRID_JITTER, GRID_JITTER, (count, 2)) * cell
+    grid_jitter = 0.25  # maximum offset of a first shape along each axis, in cells of the grid
+    centres = np.stack([x, y], axis=1) + rng.uniform(-grid_jitter, grid_jitter, (count, 2)) * cell
     centres = np.clip(centres, 0, [width, height])
     small, span = reduced(target, cell / 2)
     blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))

@@ -36,9 +36,6 @@ sqrt(3)."""
 RIDGE = 1e-6
 """Added to variances, in the same unit: a shape of one pixel has no ramp."""
 
-SLOTS_PER_CHUNK = 4096
-"""Slots that are summed over at once: bounds the memory to some 40 MB."""
-
 
 @dataclass(frozen=True)
 class Ramps:
@@ -102,7 +99,8 @@ class RampSolver:
         seen, scale = self._visible, self._viewport.scale
         at = np.arange(TILE) + 0.5
         chosen = np.flatnonzero(shapes[seen.shape])
-        for rows in np.split(chosen, range(SLOTS_PER_CHUNK, len(chosen), SLOTS_PER_CHUNK)):
+        slots_per_chunk = 4096  # slots that are summed over at once: bounds the memory to some 40 MB
+        for rows in np.split(chosen, range(slots_per_chunk, len(chosen), slots_per_chunk)):
             shape, tile = seen.shape[rows], seen.tile[rows]
             across, down = tile % self._viewport.tiles_x, tile // self._viewport.tiles_x
             x, y = (

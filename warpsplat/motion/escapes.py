@@ -35,17 +35,14 @@ def half_blocks(pixels: Pixels, *, true_color: bool) -> list[str]:
     return lines
 
 
-KITTY_CHUNK = 4096
-"""Most characters of base64 in one sequence."""
-
-
 def kitty(pixels: Pixels, columns: int, rows: int, number: int) -> str:
     """Return the picture by kitty's graphics protocol; the cursor stays where it is.
 
     ``number``: from 1; a picture replaces the previous one of the same number.
     """
     text = base64.b64encode(_png(pixels)).decode("ascii")
-    chunks = [text[i : i + KITTY_CHUNK] for i in range(0, len(text), KITTY_CHUNK)]
+    kitty_chunk = 4096  # most characters of base64 in one sequence
+    chunks = [text[i : i + kitty_chunk] for i in range(0, len(text), kitty_chunk)]
     # a=T: draw at once; f=100: a PNG; C=1: leave the cursor; q=2: no answers, which would be typed input.
     first = f"a=T,f=100,i={number},p=1,c={columns},r={rows},C=1,q=2,"
     return "".join(

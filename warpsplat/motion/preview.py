@@ -47,9 +47,6 @@ SAVE_CURSOR, RESTORE_CURSOR = "\x1b7", "\x1b8"
 MIN_COLUMNS, MIN_LINES = 8, 7
 """Smallest useful terminal."""
 
-MAX_FINISHED_SIDE = 1600
-"""Longer side at which the finished picture is rendered [px]: more than any terminal shows."""
-
 
 class Preview:
     """Draws on a stream; during a run, above the line with the cursor, which is the progress bar's."""
@@ -226,10 +223,12 @@ class _NoticeHandler(logging.Handler):
 def show_finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
     """Show a result, beside its ``source`` if there is one; what cannot be read is left out."""
     side = max(result.scene.canvas.width, result.scene.canvas.height)
+    # Longer side at which the finished picture is rendered [px]: more than any terminal shows.
+    max_finished_side = 1600
     with contextlib.suppress(ImageError):
-        rendered = render_svg(result.svg, zoom=min(1.0, MAX_FINISHED_SIDE / side))
+        rendered = render_svg(result.svg, zoom=min(1.0, max_finished_side / side))
         original = None
         if source is not None:
             with contextlib.suppress(ImageError):
-                original = image_of(source, factor=max(1, side // MAX_FINISHED_SIDE))
+                original = image_of(source, factor=max(1, side // max_finished_side))
         preview.finish((premultiplied(rendered) / 255).astype(np.float32), original)

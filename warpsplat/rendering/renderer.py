@@ -25,8 +25,6 @@ from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.scene.scene import IntArray
 
-GROWTH = 1.5
-"""Capacity over need when an array has to grow, so that a growing scene seldom does."""
 SLOT_LIMIT = 1_500_000
 """Most slots before a scene is refused: 1.3 KiB each, 2.4 for strokes, and 1 more on a GPU; up to 5 GiB."""
 SAMPLE_LIMIT = 16_000_000
@@ -246,7 +244,8 @@ class Renderer:
         if samples <= now.samples and slots <= now.slots:
             return False
         self._needed.zero_()
-        self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
+        growth = 1.5  # capacity over need when an array has to grow, so that a growing scene seldom does
+        self._build(Capacity(max(now.samples, int(growth * samples)), max(now.slots, int(growth * slots))))
         return True
 
     def capacity_and_need(self) -> tuple[Capacity, Capacity]:

@@ -33,9 +33,6 @@ log = logging.getLogger(__name__)
 DIGESTS = ("image", "mask", "svg")
 """Parts of ``identity`` that are digests."""
 
-VALUE_CHARACTERS = 40
-"""Characters of a value in a message."""
-
 
 @dataclass(frozen=True)
 class CheckpointFile:
@@ -155,9 +152,10 @@ def _digest(image: FloatArray) -> str:
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield the names of the values that differ, and both values, for people."""
+    value_characters = 40  # characters of a value in a message
     for name in {**now, **before}:
         old, new = before.get(name), now.get(name)
         if isinstance(old, dict) and isinstance(new, dict):
             yield from differences(old, new)
         elif old != new:
-            yield name.replace("_", "-"), str(old)[:VALUE_CHARACTERS], str(new)[:VALUE_CHARACTERS]
+            yield name.replace("_", "-"), str(old)[:value_characters], str(new)[:value_characters]

@@ -37,9 +37,6 @@ NOTHING = 1e-6
 VERSION, OLD_VERSION = "R2004", "R12"
 """Versions of the format: the first that has colours of 24 bits, and one that all programs read."""
 
-FOREGROUND = 7
-"""The index of the colour that programs show in black on white."""
-
 
 def draw_dxf(text: str, curves: str, *, zoom: float = 1.0) -> bytes:
     """Return an SVG's outlines as a DXF, ``zoom`` times as large; the same text gives the same bytes.
@@ -181,10 +178,11 @@ def _nearest_index(rgb: int) -> int:
     """Return the index of the colour next to ``rgb``, 0xRRGGBB, in AutoCAD's palette."""
     from ezdxf.colors import DXF_DEFAULT_COLORS
 
+    foreground = 7  # the index of the colour that programs show in black on white
     if rgb == 0:
-        return FOREGROUND
+        return foreground
 
     def distance(index: int) -> int:
         return sum(((DXF_DEFAULT_COLORS[index] >> i & 255) - (rgb >> i & 255)) ** 2 for i in (0, 8, 16))
 
-    return min((index for index in range(1, 256) if index != FOREGROUND), key=distance)
+    return min((index for index in range(1, 256) if index != foreground), key=distance)

@@ -27,9 +27,6 @@ PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "lett
 MARGIN = 10.0
 """Margin of a page on each side [mm]."""
 
-LARGEST = 10_000.0
-"""Longest side of a sheet [mm]."""
-
 STRETCHED = 'preserveAspectRatio="none"'
 """Attribute of a picture whose pixels are no squares."""
 
@@ -103,8 +100,9 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
         raise UsageError(f"not a size: {shown(size)}; write 200x150mm, or one side: 200mm or x150mm")
     factor = MILLIMETRES[(found[3] or unit).lower()]
     across, down = (float(side) * factor if side else None for side in found.groups()[:2])
-    if not all(0 < side <= LARGEST for side in (across, down) if side is not None):
-        raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
+    largest = 10_000.0  # longest side of a sheet [mm]
+    if not all(0 < side <= largest for side in (across, down) if side is not None):
+        raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {largest:g} mm")
     if across is None:
         assert down
         return Sheet(down * width / height, down, unit=unit)

@@ -162,16 +162,14 @@ def _layers(names: list[str]) -> IntArray:
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int32)
 
 
-MAX_STOPS = 1_000_000
-"""Most stops of all shapes together; each shape has its own copy of a shared gradient."""
-
-
 def _paints(shapes: list[Shape]) -> dict[str, Any]:
     """Return the fields of a scene that are about colours, gradients and pictures."""
     paints = [shape.paint for shape in shapes]
     ramps = [paint if isinstance(paint, Gradient) else None for paint in paints]
-    if sum(len(ramp.stops) for ramp in ramps if ramp) > MAX_STOPS:
-        raise ImageError(f"its gradients add up to more than {MAX_STOPS} stops")
+    # Most stops of all shapes together; each shape has its own copy of a shared gradient.
+    max_stops = 1_000_000
+    if sum(len(ramp.stops) for ramp in ramps if ramp) > max_stops:
+        raise ImageError(f"its gradients add up to more than {max_stops} stops")
     stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
     kinds = [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps]
     is_picture = np.array([isinstance(paint, KeptPicture) for paint in paints], np.bool_)
@@ -193,17 +191,11 @@ def _paints(shapes: list[Shape]) -> dict[str, Any]:
     }
 
 
-MAX_PICTURES = 1000
-"""Most pictures of a scene: each is drawn by itself, which takes a tenth of a second."""
-
 MARGIN = 4
 """Margin of a picture's rectangle around its visible pixels [px]: the picture does not reach its edges."""
 
 SEEN = 0.5 / 255
 """Least opacity that is visible."""
-
-MAX_CAUSES = 6
-"""Kinds of elements that a line names."""
 
 
 @dataclass(frozen=True)
@@ -272,10 +264,11 @@ def _in_words(kept: Sequence[Kept], pictures: Sequence[KeptPicture] = ()) -> str
         cause = one.cause.removesuffix(", not supported").removeprefix("uses ")
         counts[tag if cause == tag else f"{tag} ({cause})"] += 1
     texts = [f"{count} {name}" if count > 1 else name for name, count in counts.items()]
-    more = f" and {len(texts) - MAX_CAUSES} more kinds" if len(texts) > MAX_CAUSES else ""
+    max_causes = 6  # kinds of elements that a line names
+    more = f" and {len(texts) - max_causes} more kinds" if len(texts) > max_causes else ""
     hidden = sum(not one.pixels.any() for one in pictures)
     unseen = f"; {hidden} of {len(pictures)} such places show nothing here" if hidden else ""
-    return ", ".join(texts[:MAX_CAUSES]) + more + unseen
+    return ", ".join(texts[:max_causes]) + more + unseen
 
 
 def _with_pictures(
@@ -296,9 +289,10 @@ def _with_pictures(
     definitions = excerpts.of(excerpts.needed([one.element for one in kept]), size)
     shared = excerpts.style(scope) + (f"<defs>{definitions}</defs>" if definitions else "")
     runs = [list(run) for _, run in groupby(parts, lambda part: isinstance(part, Kept))]
-    if sum(isinstance(run[0], Kept) for run in runs) > MAX_PICTURES:
+    max_pictures = 1000  # most pictures of a scene: each is drawn by itself, which takes a tenth of a second
+    if sum(isinstance(run[0], Kept) for run in runs) > max_pictures:
         raise ImageError(
-            f"contains elements other than paths in more than {MAX_PICTURES} places between paths"
+            f"contains elements other than paths in more than {max_pictures} places between paths"
         )
     shapes: list[Shape] = []
     is_first = True

@@ -23,9 +23,6 @@ from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Points, Subpath, cubics
 from warpsplat.svg.values import SvgViewport, fraction, length, lengths, parse_color
 
-MAX_EXTENT = 1e5
-"""Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse."""
-
 
 @dataclass(frozen=True)
 class LineStyle:
@@ -217,8 +214,10 @@ def _check(place: Placement, subpaths: list[Subpath], line: LineStyle | None) ->
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
     reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
-    if not (reach <= MAX_EXTENT).all():  # NaN fails as well
-        raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
+    # Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse.
+    max_extent = 1e5
+    if not (reach <= max_extent).all():  # NaN fails as well
+        raise ImageError(f"a shape reaches farther than {max_extent:g} px from the picture")
 
 
 def _is_of_pixels(subpaths: list[Subpath]) -> bool:

@@ -36,9 +36,6 @@ MAX_LINKED = 100_000
 MAX_WORK = 5_000_000
 """Most shapes summed over the groups that clip or fade them; nesting multiplies them."""
 
-MAX_DEPTH = 1000
-"""Deepest nesting, links included."""
-
 REFUSED = {"text", "tref", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe"}
 REFUSED |= {"mesh", "hatch"}
 """Elements that show something other than shapes. Unknown elements show nothing."""
@@ -254,8 +251,9 @@ class _Walk:
             self._shapes += [replace(shape, element=own, level=context.level) for shape in shapes]
             self._end(end)
             return
-        if inner.depth > MAX_DEPTH:
-            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        max_depth = 1000  # deepest nesting, links included
+        if inner.depth > max_depth:
+            raise ImageError(f"elements are nested more than {max_depth} deep")
         self._todo.append(end)
         if tag == "use":
             self._link(element, inner, unit)
