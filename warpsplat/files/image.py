@@ -60,9 +60,8 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
     Raises:
         ImageError: As ``files.sources.image_of``.
     """
-    bomb_pixels = 16_000_000
     # Larger images with more pixels a byte are bombs, or blank: drawings in two colours have a tenth of that.
-    pixels_a_byte = 10_000
+    bomb_pixels, pixels_a_byte = 16_000_000, 10_000
     try:
         with _opened(source) as image:
             width, height = image.size

@@ -43,8 +43,6 @@ STRIPS = 96 << 20
 FILE_STRIPS = 96 << 20
 """Bytes of the strips of a file that are drawn side by side."""
 
-SLOT = 1500
-
 SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 """Slots of a fit per tile, per root of tiles times shapes, and per shape."""
 
@@ -129,11 +127,9 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int, lanes: int = 0)
     pixels, curves = phase.width * phase.height, settings.curves
     tiles = pixels / 256
     slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * math.sqrt(tiles * curves) + SLOTS_A_SHAPE * curves
-    slot = SLOT + lanes
-    slot_stroke = 1100
-    slot += slot_stroke if settings.kind == Kind.STROKE or settings.mixed else 0
-    slot_paint = 4200  # bytes per slot (rendering.renderer), and what strokes and gradients add
-    slot += slot_paint + lanes if settings.painting != "flat" else 0
+    slot = 1500 + lanes  # bytes per slot (rendering.renderer), and what strokes and gradients add
+    slot += 1100 if settings.kind == Kind.STROKE or settings.mixed else 0
+    slot += 4200 + lanes if settings.painting != "flat" else 0
     levels = len(settings.levels) or 1
     # Bytes per pixel of the finest size: target, render, gradient, weights, error maps, the file's render.
     trained = 160

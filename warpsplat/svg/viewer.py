@@ -99,12 +99,10 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
     """Return the output of ``draw_child`` for ``text``, under limits for a picture of so many ``pixels``."""
     if not pixels <= MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    cpu_per_byte = 5e-6
-    cpu_per_pixel = 1.2e-7  # bounds of the processor time [s]: three times what large plain drawings take
-    seconds = round(CPU_SECONDS + cpu_per_byte * len(text) + cpu_per_pixel * pixels)
-    memory_per_byte = 100
-    memory_per_pixel = 12  # bounds of the address space [bytes]: three layers, and 100 times the text
-    memory = round(MEMORY + memory_per_byte * len(text) + memory_per_pixel * pixels)
+    # Of the processor time [s] three times what large plain drawings take; of the address space [bytes] three
+    # layers, and 100 times the text.
+    seconds = round(CPU_SECONDS + 5e-6 * len(text) + 1.2e-7 * pixels)
+    memory = round(MEMORY + 100 * len(text) + 12 * pixels)
     options = {**options, "skip_system_fonts": TEXT.search(text) is None}
     limits = {"seconds": seconds, "memory": memory}
     request = {"path": sys.path, **limits, "form": form, "options": options}
@@ -136,9 +134,11 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
 
 
 CPU_SECONDS = 4.0
+"""Processor time that every file may take, besides that for its length and its pixels."""
 WALL_FACTOR = 3
 """Ratio of the bound of wall-clock time to that of processor time."""
 MEMORY = 3 << 29
+"""Address space that every file may take [bytes], likewise."""
 LIMIT_SIGNALS = (9, 24)
 """SIGKILL and SIGXCPU, which end a process at its limit of processor time."""
 
