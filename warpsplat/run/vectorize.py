@@ -201,7 +201,7 @@ def _fitted(image: PreparedImage, run: Run, start: Start | None) -> tuple[Prepar
     return image, strategy, made
 
 
-class Drawn(NamedTuple):
+class _File(NamedTuple):
     """A fit as a file."""
 
     file: str
@@ -213,7 +213,7 @@ class Drawn(NamedTuple):
 
 def _drawn(
     made: Fit, image: PreparedImage, strategy: Strategy, settings: Settings, optics: Explained | None
-) -> Drawn:
+) -> _File:
     """Return the file of what was made of an image."""
     release_memory()
     paper = paper_for(image, settings)
@@ -231,7 +231,7 @@ def _drawn(
         judged = on_removed(svg, scene, settings, made.per_pixel, background)
     notes += (optics.words(),) if optics else ()
     notes += (*paper.notes(), *bridge_notes(scene, settings, made.per_pixel))
-    return Drawn(paper(svg), judged, scene, notes)
+    return _File(paper(svg), judged, scene, notes)
 
 
 def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:
