@@ -12,9 +12,6 @@ from click.shell_completion import CompletionItem
 
 from warpsplat.fit.options import GROUPS, Group
 
-COLUMN = 26
-"""Column where explanations begin."""
-
 SHOWS_ALL = "warpsplat.cli.help.shows_all"
 """Key of ``click.Context.meta``: whether the help is to explain all options."""
 
@@ -118,11 +115,12 @@ def _records(ctx: click.Context, options: Iterable[click.Parameter]) -> list[tup
 
 def _write_rows(formatter: click.HelpFormatter, rows: Iterable[tuple[str, str]]) -> None:
     """Write rows of two columns; the same in all groups, and not broken at hyphens."""
+    column = 26  # column where explanations begin
     for term, words in rows:
         first = f"{'':{formatter.current_indent}}{term}"
-        lines = textwrap.wrap(words, formatter.width - COLUMN, break_on_hyphens=False) or [""]
-        start = [] if len(first) > COLUMN - 2 else [f"{first:{COLUMN}}{lines.pop(0)}"]
+        lines = textwrap.wrap(words, formatter.width - column, break_on_hyphens=False) or [""]
+        start = [] if len(first) > column - 2 else [f"{first:{column}}{lines.pop(0)}"]
         for line in start or [first]:
             formatter.write(f"{line}\n")
         for line in lines:
-            formatter.write(f"{'':{COLUMN}}{line}\n")
+            formatter.write(f"{'':{column}}{line}\n")

@@ -36,9 +36,6 @@ COMMANDS: dict[str, Command] = {
 """All commands: those of the core, then those of the extensions."""
 
 
-GARBAGE = 500_000
-"""Objects that are made, over those that are freed, before Python looks for cycles."""
-
 FOR_SVG = ("render FILE.svg", "refine FILE.svg IMAGE", "eval IMAGE FILE.svg")
 FOR_YAML = ("batch FILE.yaml",)
 FOR_FILES = {".svg": FOR_SVG, ".svgz": FOR_SVG, ".yaml": FOR_YAML, ".yml": FOR_YAML}
@@ -135,7 +132,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     # NumPy's linear algebra, which is not used, would start threads.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # The objects of all imports are checked for cycles again and again: a quarter of the time that they take.
-    gc.set_threshold(GARBAGE)
+    garbage = 500_000  # objects that are made, over those that are freed, before Python looks for cycles
+    gc.set_threshold(garbage)
     # As the process ends, the objects of all modules would be checked once more: a quarter of a second.
     atexit.register(gc.freeze)
     code: Any = ExitCode.INTERNAL

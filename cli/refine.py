@@ -92,6 +92,7 @@ def command(
     output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
     from warpsplat.cli.run import decibels, echo_exceptions, echo_unused_dxf, finish, watched
+    from warpsplat.run.command_line import refine_command
     from warpsplat.run.refine import refine
     from warpsplat.run.result import finite
     from warpsplat.svg.inspect import MAX_BYTES
@@ -123,8 +124,6 @@ def command(
     values = {"svg": str(svg), "output": str(output), "psnr_before": finite(before), **result.as_dict()}
     if keep:
         values["kept"] = result.kept
-    from warpsplat.run.command_line import refine_command
-
     line = refine_command(settings, str(svg), str(image), str(output), *(["--keep"] if keep else []))
     done = Done(request, shown, [(output, result)], line)
     finish(done, hooks, values, note=f" (before: {decibels(finite(before))})", aside=output == STANDARD)

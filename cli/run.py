@@ -28,9 +28,6 @@ from warpsplat.scene import Kind
 
 PLURALS = {Kind.FILL: "fills", Kind.STROKE: "strokes"}
 
-BAR_LENGTH = 1000
-"""Units of the progress bar, each a thousandth of the work."""
-
 
 class Bar:
     """The text beside the progress bar; the PSNR it shows never decreases."""
@@ -62,8 +59,9 @@ def progress_bar(source: Path, *, quiet: bool, verbose: int) -> Iterator[Callabl
 
         yield echo_step
         return
+    bar_length = 1000  # units of the progress bar, each a thousandth of the work
     bar: Any = click.progressbar(
-        length=BAR_LENGTH,
+        length=bar_length,
         label=printable(source.name),
         file=sys.stderr,
         item_show_func=lambda text: text,
@@ -73,7 +71,7 @@ def progress_bar(source: Path, *, quiet: bool, verbose: int) -> Iterator[Callabl
 
     def show(progress: Progress) -> None:
         text = state.update(progress, time.monotonic())
-        bar.update(round(BAR_LENGTH * progress.work) - bar.pos, text)
+        bar.update(round(bar_length * progress.work) - bar.pos, text)
 
     with bar:
         yield show

@@ -65,14 +65,12 @@ def _exit(code: int) -> None:
     os._exit(code)
 
 
-COMPILER_TIME = 2.0
-"""Time for modules that are being compiled when the program ends: they are kept, and leave no files [s]."""
-
-
 def leave_compiler(code: int) -> None:
     """Exit now if kernels are being compiled that take longer: the compiler cannot be stopped."""
     compiler = sys.modules.get("warpsplat.rendering.compiler")
-    if compiler and not compiler.compiler_finished(COMPILER_TIME):
+    # Time for modules that are being compiled when the program ends: they are kept, and leave no files [s].
+    compiler_time = 2.0
+    if compiler and not compiler.compiler_finished(compiler_time):
         with contextlib.suppress(OSError):
             sys.stdout.flush()
         _exit(code)

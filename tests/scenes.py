@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.forms import form_of
-from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, Kind, Paint, Picture, Rule, Scene
+from warpsplat.scene import Basis, Canvas, Cap, FloatArray, Join, KeptPicture, Kind, Paint, Rule, Scene
 from warpsplat.scene.attributes import NO_DASHES
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import starts_of
@@ -222,7 +222,7 @@ def started_alike(scene: Scene, like: Scene) -> Scene:
     return replace(scene, points=points)
 
 
-def picture_scene(canvas: Canvas, picture: Picture) -> Scene:
+def picture_scene(canvas: Canvas, picture: KeptPicture) -> Scene:
     """Return a picture on all of a canvas."""
     return replace(
         disc(500, canvas.width, canvas.width / 2),

@@ -33,7 +33,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "scene": ("kernels.constants", "errors", "forms", "portable"),
     "files": ("errors", "native", "portable", "scene", "_version"),
     "svg": ("errors", "forms", "native", "portable", "scene", "files.inputs"),
-    "metrics": ("errors", "portable", "svg", "ssimulacra2"),
+    "metrics": ("errors", "native", "portable", "svg", "ssimulacra2"),
     "ssimulacra2": (),
     "rendering": CORE,
     "fit": ("alpha", "metrics", "rendering", "svg", *CORE),

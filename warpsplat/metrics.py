@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.field_docs import described
+from warpsplat.native import STRIP_PIXELS
 from warpsplat.portable import elementary
 from warpsplat.ssimulacra2 import ssimulacra2
 from warpsplat.svg.inspect import inspect_svg
-from warpsplat.svg.viewer import STRIP_PIXELS, WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
+from warpsplat.svg.viewer import WHOLE_PIXELS, Bytes, Stop, check_stop, draw, rows_of
 
 Floats = npt.NDArray[np.floating]
 
@@ -27,9 +28,6 @@ MIDDLE = np.float32(128)
 
 MS_SSIM_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Weights of the five scales (Wang et al. 2003, section 3.2)."""
-
-SSIMULACRA2_PIXELS = 4_000_000
-"""Largest image that SSIMULACRA2 is measured for [pixels]: it takes 200 bytes a pixel."""
 
 
 class Rows(Protocol):
@@ -228,7 +226,9 @@ def score_svg(
     paper = papers[0] if len(papers) == 1 else max(papers, key=lambda level: _error(shown, target, level))
     fidelity, single, multiple = _figures(_shown_and_wanted(shown, target, paper), stop)
     check_stop(stop)
-    perceptual = perceptual and height * width <= SSIMULACRA2_PIXELS
+    # Largest image that SSIMULACRA2 is measured for [pixels]: it takes 200 bytes a pixel.
+    ssimulacra2_pixels = 4_000_000
+    perceptual = perceptual and height * width <= ssimulacra2_pixels
     seen = ssimulacra2(*_in_8_bits(shown, target, paper)) if perceptual else None
     facts = inspect_svg(text)
     return Score(

@@ -11,6 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+STRIP_PIXELS = 1 << 20
+"""Pixels of a large image that are converted, drawn or compared at a time, for little memory."""
+
 _lock = threading.Lock()
 _hiding = 0
 """Threads that hide messages."""

@@ -9,8 +9,6 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 
 SCALES = 6
-SMALLEST_SIDE = 8
-"""Smallest side of a scale [px]."""
 
 SIGMA, RADIUS = 1.5, 5
 """Gaussian window [px]."""
@@ -26,8 +24,6 @@ OPSIN = np.array(
     ]
 )
 """Matrix from linear sRGB to the responses of the eye's cones, as in JPEG XL."""
-
-OPSIN_BIAS = 0.0037930732552754493
 
 XYB = np.array([[7.0, -7.0, 0.0], [0.5, 0.5, 0.0], [-0.5, -0.5, 1.0]])
 XYB_OFFSET = np.array([0.42, 0.01, 0.55])
@@ -63,7 +59,8 @@ def ssimulacra2(a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8]) -> float | N
     """
     linear = [_linear_table()[image] for image in (a, b)]
     scales: list[npt.NDArray[np.float64]] = []
-    while len(scales) < SCALES and min(linear[0].shape[:2]) >= SMALLEST_SIDE:
+    smallest_side = 8  # smallest side of a scale [px]
+    while len(scales) < SCALES and min(linear[0].shape[:2]) >= smallest_side:
         scales.append(_differences(*map(_opponent_colors, linear)))
         linear = [_halved(image) for image in linear]
     if not scales:
@@ -83,9 +80,10 @@ def _linear_table() -> Floats:
 
 def _opponent_colors(linear: Floats) -> Floats:
     """Return an image in positive XYB, shape (height, width, 3)."""
-    cones = cv2.transform(linear, np.column_stack([OPSIN, np.full(3, OPSIN_BIAS)]))
+    opsin_bias = 0.0037930732552754493
+    cones = cv2.transform(linear, np.column_stack([OPSIN, np.full(3, opsin_bias)]))
     roots = np.cbrt(np.maximum(cones, 0))
-    offset = XYB_OFFSET - XYB.sum(axis=1) * np.cbrt(OPSIN_BIAS)
+    offset = XYB_OFFSET - XYB.sum(axis=1) * np.cbrt(opsin_bias)
     return np.asarray(cv2.transform(roots, np.column_stack([XYB, offset])), np.float32)
 
 

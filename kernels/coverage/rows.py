@@ -1,4 +1,4 @@
-"""What a thread of a coverage kernel handles: the slots of a shape in one row of tiles, or some of them."""
+"""The share of a thread of a coverage kernel: the slots of a shape in one row of tiles, or some of them."""
 
 import warp as wp
 

@@ -18,7 +18,7 @@ from warpsplat.fit.state import FitState
 from warpsplat.fit.step import Step, Target
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import Capacity
-from warpsplat.scene import Canvas, Cap, FloatArray, Kind, Paint, Picture, Scene
+from warpsplat.scene import Canvas, Cap, FloatArray, KeptPicture, Kind, Paint, Scene
 
 
 def picture(width: int = 64, height: int = 48) -> FloatArray:
@@ -65,7 +65,7 @@ def steps_of_all_kinds(device: str, threads: int = 1) -> Iterator[Step]:
     twins = replace(painted.take(np.array([stroke, stroke])), twin=np.array([0, 1], np.int32))
     scene = painted.append(twins)
     scene = replace(scene, cap=np.full(len(scene), Cap.BUTT, np.int32), canvas=Canvas(64, 48, None))
-    kept = Picture("<g/>", (64, 48), (9, 9), np.full((20, 20, 4), 0.5, np.float32))
+    kept = KeptPicture("<g/>", (64, 48), (9, 9), np.full((20, 20, 4), 0.5, np.float32))
     target = np.concatenate([picture(), np.ones((48, 64, 1), np.float32)], axis=2)
     yield step_for(scene.append(picture_scene(scene.canvas, kept)), target, device, threads=threads)
     yield step_for(seam().scene, np.ones((32, 48, 3), np.float32), device, threads=threads)

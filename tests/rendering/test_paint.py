@@ -11,7 +11,7 @@ from tests.helpers import adjoint, compare, renderer_for
 from tests.scenes import disc, mixed_scene, picture_scene, random_scene, with_gradients, with_stops
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import NO_PICTURE, Canvas, Kind, Paint, Picture, Scene, Spread
+from warpsplat.scene import NO_PICTURE, Canvas, Kind, Paint, KeptPicture, Scene, Spread
 
 
 def transparent(scene: Scene) -> Scene:
@@ -83,16 +83,16 @@ def test_empty_pixels_are_exactly_zero(device: str) -> None:
     np.testing.assert_allclose(image[20, 20], np.ones(4), atol=1e-6)
 
 
-def shown(height: int, width: int, seed: int = 0) -> Picture:
+def shown(height: int, width: int, seed: int = 0) -> KeptPicture:
     """Opaque in the middle, thinner towards its edges, empty at them."""
     rng = np.random.default_rng(seed)
     y, x = (np.abs(np.linspace(-1, 1, n)) for n in (height, width))
     opacity = np.clip(2 - 2 * np.maximum(y[:, None], x), 0, 1)[..., None]
     pixels = np.concatenate([opacity * rng.random((height, width, 3)), opacity], axis=2)
-    return Picture("<g/>", (1, 1), (7, 9), pixels.astype(np.float32))
+    return KeptPicture("<g/>", (1, 1), (7, 9), pixels.astype(np.float32))
 
 
-def between(below: Scene, above: Scene, picture: Picture) -> Scene:
+def between(below: Scene, above: Scene, picture: KeptPicture) -> Scene:
     """The picture on a rectangle between two scenes."""
     return below.append(picture_scene(below.canvas, picture)).append(above)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import pytest
 import warpsplat
 from tests.run.helpers import CLEAR, PICTURE, Make, after, fitted, refined, slopes
 from tests.scenes import forms_scene, mixed_scene
-from warpsplat.errors import OutputError, UsageError, WarpsplatError
+from warpsplat.errors import CheckpointError, OutputError, UsageError
 from warpsplat.files.packed import is_packed, pack, unpack
 from warpsplat.fit import checkpoint
 from warpsplat.run import checkpoint as module
@@ -78,9 +77,9 @@ def test_a_run_that_was_killed_goes_on_from_the_last_save(
     steps = itertools.count(1)
     with pytest.raises(KeyboardInterrupt):
         fitted(checkpoint=path, checkpoint_every=0, stop=killed)
-    header, _ = unpack(path)
-    assert [state["step"] for state in header["fits"]] == [30]
-    assert header["run"]["settings"]["curves"] == 10 and header["version"] == warpsplat.__version__
+    content = unpack(path)
+    assert content["fits"] == [] and content["state"]["step"] == 30
+    assert content["run"]["settings"]["curves"] == 10 and content["version"] == warpsplat.__version__
     assert fitted(checkpoint=path, resume=True).svg == fitted().svg
 
 
@@ -89,8 +88,8 @@ def test_a_stopped_file_says_so_and_a_goal_is_stopped_between_its_fits(tmp_path:
     path = tmp_path / "run.checkpoint"
     run = RUNS["layered"]
     stopped = run(checkpoint=path, stop=after(21))
-    header, _ = unpack(path)
-    assert not header["under way"] and len(header["fits"]) == 1
+    content = unpack(path)
+    assert content["state"] is None and len(content["fits"]) == 1
     assert "stopped" in read_metadata(stopped.svg)
     assert run(checkpoint=path, resume=True).svg == run().svg
 
@@ -137,67 +136,23 @@ def test_a_checkpoint_of_another_run_is_refused(saved: Path, given: dict[str, An
     assert is_packed(saved)
 
 
-def changed(saved: Path, path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], None]) -> Path:
-    """Write a valid archive with changed content."""
-    header, arrays = unpack(saved)
-    change(header, arrays)
-    path.write_bytes(pack(header, arrays))
+def changed(saved: Path, path: Path, **change: str) -> Path:
+    """Write a valid checkpoint with changed content."""
+    path.write_bytes(pack(unpack(saved) | change))
     return path
 
 
-def at(*keys: Any, value: Any) -> Callable[[dict[str, Any], dict[str, np.ndarray]], None]:
-    """Return a change of one entry."""
-
-    def change(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
-        place: Any = arrays if "/" in str(keys[0]) else header
-        for key in keys[:-1]:
-            place = place[key]
-        place[keys[-1]] = value(place[keys[-1]]) if callable(value) else value
-
-    return change
-
-
-@pytest.mark.parametrize(
-    ("change", "cause"),
-    [
-        (at("format", value=2), "format 2, this program reads 1"),
-        (at("version", value="9.9"), "made by warpsplat 9.9"),
-        (at("fits", value=3), "no list"),
-        (at("under way", value=None), "under way is no bool"),
-        (at("fits", 0, "step", value=56), "step is no int"),
-        (at("fits", 0, "step", value=True), "step is no int"),
-        (at("fits", 0, "curves", value=11), "curves"),
-        (at("fits", 0, "generator", value={}), "damaged"),
-        (at("fits", 0, "generator", "state", "state", value=-1), "damaged"),
-        (at("fits", 0, "room", value=[]), "damaged"),
-        (at("fits", 0, "room", 0, "slots", value=10**6), "slots"),
-        (at("fits", 0, "per_pixel", value=float("nan")), "per_pixel"),
-        (at("0/points", value=lambda a: np.where(a == a.max(), np.float32(np.nan), a)), "points has numbers"),
-        (at("0/points", value=lambda a: a[:-1]), "points"),
-        (at("0/points", value=lambda a: a.view(np.int32)), "points has elements of another type"),
-        (at("0/moment2.points", value=lambda a: -1 - a), "moment2.points has numbers"),
-        (at("0/held.colors", value=lambda a: a + 2), "held.colors"),
-        (at("0/kind", value=lambda a: a + 7), "kind has numbers"),
-        (at("0/first", value=lambda a: a[::-1].copy()), "first does not ascend"),
-        (at("0/starts", value=lambda a: a[:1]), "starts does not ascend"),
-        (at("0/paint", value=lambda a: a + 1), "gradient has no stops"),
-        (at("0/picture", value=lambda a: a + 1), "picture has numbers"),
-        (at("0/twin", value=lambda a: a[None]), "dimensions"),
-        (at("0/ages", value=lambda a: a[1:]), "ages has shape"),
-    ],
-)  # fmt: skip
-def test_damage_is_one_line(saved: Path, tmp_path: Path, change: Any, cause: str) -> None:
-    path = changed(saved, tmp_path / "run.checkpoint", change)
-    with pytest.raises(WarpsplatError, match=cause) as caught:
+def test_damage_and_another_version_are_one_line(saved: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.checkpoint"
+    path.write_bytes(saved.read_bytes()[:-1])
+    with pytest.raises(CheckpointError, match=r"run\.checkpoint: the checkpoint is damaged"):
         fitted(checkpoint=path, resume=True)
-    assert int(caught.value.exit_code) in (2, 3)
-    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+    with pytest.raises(UsageError, match=r"run\.checkpoint: made by warpsplat 9\.9, this is"):
+        fitted(checkpoint=changed(saved, path, version="9.9"), resume=True)
 
 
-def test_a_checkpoint_of_another_device(
-    saved: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    path = changed(saved, tmp_path / "run.checkpoint", at("device", value="another"))
+def test_another_device_is_said(saved: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = changed(saved, tmp_path / "run.checkpoint", device="another")
     fitted(checkpoint=path, resume=True, stop=lambda: True)
     assert "its bytes will differ" in caplog.text
 

@@ -18,7 +18,7 @@ import warpsplat
 from tests.scenes import contours_scene, mixed_scene, picture_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.run.result import LevelScore
-from warpsplat.scene import Canvas, Kind, Picture, Rule, Scene
+from warpsplat.scene import Canvas, KeptPicture, Kind, Rule, Scene
 from warpsplat.svg.viewer import render_svg
 
 PIXELS = np.random.default_rng(0).uniform(0, 1, (24, 32, 3))
@@ -26,7 +26,7 @@ PIXELS = np.random.default_rng(0).uniform(0, 1, (24, 32, 3))
 
 def pictured() -> Scene:
     canvas = Canvas(20, 10, None)
-    return picture_scene(canvas, Picture("<g/>", (20, 10), (2, 3), np.full((4, 5, 4), 0.5, np.float32)))
+    return picture_scene(canvas, KeptPicture("<g/>", (20, 10), (2, 3), np.full((4, 5, 4), 0.5, np.float32)))
 
 
 @pytest.fixture(scope="module")
@@ -85,10 +85,12 @@ def test_notebooks_show_the_file(results: list[warpsplat.Result]) -> None:
     assert render_svg(base64.b64decode(source[1]).decode()).size == (32, 24)
 
 
-PUBLIC = "Result Score Progress Snapshot Expected Suggestion Scene Canvas CustomLoss"
+PUBLIC = [getattr(warpsplat, name) for name in "Result Score Progress Snapshot Expected Suggestion Scene Canvas CustomLoss".split()]
 
 
-@pytest.mark.parametrize("cls", [LevelScore, Picture, *(getattr(warpsplat, name) for name in PUBLIC.split())])
+@pytest.mark.parametrize(
+    "cls", [LevelScore, KeptPicture, *PUBLIC])
+)
 def test_help_describes_every_field(cls: Any) -> None:
     text = inspect.getdoc(cls) or ""
     for field in dataclasses.fields(cls):

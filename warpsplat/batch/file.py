@@ -18,15 +18,6 @@ from warpsplat.run.options import BY_NAME, RESEARCH_KEYS
 MAX_FILE = 1 << 20
 """Largest batch file [bytes]: a mebibyte of YAML takes seconds to read."""
 
-MAX_DEPTH = 16
-"""Deepest nesting of a batch file; four levels are needed."""
-
-MAX_SCALAR = 4096
-"""Longest single value [characters]: as long as the longest path."""
-
-MAX_ALIASED = 100_000
-"""Most values that the aliases of a file stand for: aliases of aliases multiply."""
-
 
 class BatchFile:
     """A parsed YAML file that can name the line of each of its keys."""
@@ -119,6 +110,9 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
     open_: list[tuple[str, int]] = []
     """Anchors of the open collections, and the number of values before each."""
     values = aliased = 0
+    max_depth = 16  # deepest nesting of a batch file; four levels are needed
+    max_scalar = 4096  # longest single value [characters]: as long as the longest path
+    max_aliased = 100_000  # most values that the aliases of a file stand for: aliases of aliases multiply
     while loader.check_event():
         event = loader.get_event()
         line = event.start_mark.line + 1 if event.start_mark else 1
@@ -127,19 +121,19 @@ def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
         if isinstance(event, yaml.AliasEvent):
             size = sizes.get(anchor, 1)
             aliased += size
-            if aliased > MAX_ALIASED:
+            if aliased > max_aliased:
                 raise error(
-                    line, f"aliases stand for more than {MAX_ALIASED} values, the last is *{cut(anchor)}"
+                    line, f"aliases stand for more than {max_aliased} values, the last is *{cut(anchor)}"
                 )
         elif isinstance(event, yaml.CollectionStartEvent):
             open_.append((anchor, values))
             size = 1
-            if len(open_) > MAX_DEPTH:
-                raise error(line, f"nested deeper than {MAX_DEPTH} levels")
+            if len(open_) > max_depth:
+                raise error(line, f"nested deeper than {max_depth} levels")
         elif isinstance(event, yaml.ScalarEvent):
             size = sizes[anchor] = 1 + len(event.value) // 100  # long values count several times
-            if len(event.value) > MAX_SCALAR:
-                raise error(line, f"a value of more than {MAX_SCALAR} characters")
+            if len(event.value) > max_scalar:
+                raise error(line, f"a value of more than {max_scalar} characters")
         values += size
         if isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_.pop()

@@ -15,9 +15,6 @@ from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
 
-MOST_THUMBNAILS = 2000
-"""Longer lists have no thumbnails: each is 3 kB."""
-
 
 def write_index(
     reports: Reports, jobs: Sequence[BatchJob], outcomes: Mapping[Path, JobOutcome], manifest: Manifest
@@ -30,7 +27,8 @@ def write_index(
     from warpsplat.pages.environment import page
 
     rows = [_row(reports, job, *_state(job, outcomes.get(job.output), manifest)) for job in jobs]
-    if len(jobs) <= MOST_THUMBNAILS:
+    most_thumbnails = 2000  # longer lists have no thumbnails: each is 3 kB
+    if len(jobs) <= most_thumbnails:
         for job, row in zip(jobs, rows, strict=True):
             row["thumbnail"] = reports.thumbnail_of(job.output) if row["report"] else ""
     text = page("index.html.j2", assets=("index.css", "index.js"), totals=totals(rows), data={"rows": rows})

@@ -31,9 +31,6 @@ SINGLE_KEYS = (
 MATRIX = "matrix"
 """Key of lists of values: a job is done with each combination of them."""
 
-MOST_COMBINATIONS = 1000
-"""Maximum number of combinations of a matrix."""
-
 
 @dataclass(frozen=True)
 class GivenValue:
@@ -83,11 +80,12 @@ def _nested(file: BatchFile, key: str, node: yaml.Node) -> dict[str, Any]:
 
 def _axes(file: BatchFile, node: yaml.Node) -> dict[str, list[GivenValue]]:
     axes: dict[str, list[GivenValue]] = {}
+    most_combinations = 1000  # maximum number of combinations of a matrix
     for key, (line, inner) in file.mapping(node, MATRIX, (*BY_NAME, *RESEARCH_KEYS)).items():
         if not isinstance(inner, yaml.SequenceNode) or not inner.value:
             raise file.error(line, f"{MATRIX}: {key}: must be a list of values")
-        if math.prod(map(len, axes.values())) * len(inner.value) > MOST_COMBINATIONS:
-            raise file.error(line, f"{MATRIX}: more than {MOST_COMBINATIONS} combinations")
+        if math.prod(map(len, axes.values())) * len(inner.value) > most_combinations:
+            raise file.error(line, f"{MATRIX}: more than {most_combinations} combinations")
         axes[key] = [_single(file, key, item.start_mark.line + 1, item) for item in inner.value]
     return axes
 

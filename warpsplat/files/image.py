@@ -22,7 +22,7 @@ from warpsplat.errors import ImageError, cause_of
 from warpsplat.files.plugins import PLUGINS, plugin_formats
 from warpsplat.files.profile import Profile, profile_of
 from warpsplat.files.resolution import SWAPPED, Resolution, resolution_of
-from warpsplat.native import messages_hidden
+from warpsplat.native import STRIP_PIXELS, messages_hidden
 from warpsplat.portable.filters import boxed
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import FloatArray
@@ -35,20 +35,10 @@ FORMATS = (
 programs (EPS, which it passes to Ghostscript), drawings (WMF), containers of other formats (IPTC), or rare.
 """
 
-MIN_SIDE = 2
-"""Smallest side of an image [px]: with one pixel there is nothing to fit a shape to."""
-
 MAX_PIXELS = 120_000_000
 """Largest image [pixels], that of the largest cameras."""
 
 TOO_LARGE = f"more than {MAX_PIXELS / 1e6:g} million pixels"
-
-BOMB_PIXELS = 16_000_000
-PIXELS_A_BYTE = 10_000
-"""Larger images with more pixels a byte are bombs, or blank: drawings in two colours have a tenth of that."""
-
-STRIP_PIXELS = 1 << 20
-"""Pixels that are converted at a time."""
 
 WEBP_SIDE = 16_383
 """Longest side of a WebP [px]: its header has 14 bits for it."""
@@ -70,11 +60,13 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
     Raises:
         ImageError: As ``files.sources.image_of``.
     """
+    # Larger images with more pixels a byte are bombs, or blank: drawings in two colours have a tenth of that.
+    bomb_pixels, pixels_a_byte = 16_000_000, 10_000
     try:
         with _opened(source) as image:
             width, height = image.size
             check_size(width, height)
-            if width * height > max(BOMB_PIXELS, PIXELS_A_BYTE * len(source)):
+            if width * height > max(bomb_pixels, pixels_a_byte * len(source)):
                 raise ImageError(f"claims {width}x{height} pixels in {len(source)} bytes")
             _check_covered(image)
             rawmode = _rawmode(image)
@@ -98,8 +90,9 @@ def decoded(source: bytes, name: str, factor: int = 1) -> Iterator[tuple[Image.I
 
 def check_size(width: int, height: int) -> None:
     """Raise ``ImageError`` for an image of too few or too many pixels."""
-    if min(width, height) < MIN_SIDE:
-        raise ImageError(f"{width}x{height} pixels; at least {MIN_SIDE}x{MIN_SIDE} are needed")
+    min_side = 2  # smallest side of an image [px]: with one pixel there is nothing to fit a shape to
+    if min(width, height) < min_side:
+        raise ImageError(f"{width}x{height} pixels; at least {min_side}x{min_side} are needed")
     if width * height > MAX_PIXELS:
         raise ImageError(TOO_LARGE)
 

@@ -24,9 +24,6 @@ log = logging.getLogger(__name__)
 SPACES = {"RGB": "RGB", "GRAY": "L", "CMYK": "CMYK"}
 """Colour spaces of profiles, and Pillow's modes for them."""
 
-SAME = 1
-"""Largest difference from sRGB, in levels of 255, of a profile for sRGB itself; several exist."""
-
 
 class Profile:
     """A conversion of an image's colours to sRGB; made by ``profile_of``."""
@@ -62,7 +59,9 @@ class Profile:
         colors = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
         given = np.arange(256, dtype=np.uint8)[None] if self._mode == "L" else colors
         found = np.asarray(self.rgb(Image.fromarray(given)))
-        return bool((np.abs(found.astype(int) - np.atleast_3d(given)) <= SAME).all())
+        # Largest difference from sRGB, in levels of 255, of a profile for sRGB itself; several exist.
+        same = 1
+        return bool((np.abs(found.astype(int) - np.atleast_3d(given)) <= same).all())
 
 
 def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:

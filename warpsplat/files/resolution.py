@@ -10,9 +10,6 @@ from PIL import ExifTags, Image
 RANGE = (1.0, 1e6)
 """Resolutions that are taken seriously [pixels an inch], from a pixel an inch to a tenth of a wavelength."""
 
-UNKNOWN = 72.0
-"""The resolution that the EXIF standard prescribes where none is known [pixels an inch]."""
-
 PER_INCH = {2: 1.0, 3: 2.54}
 """Inches over the unit of a resolution, by EXIF's and TIFF's numbers of inches and centimetres."""
 
@@ -56,7 +53,8 @@ def _in_exif(exif: Image.Exif) -> Resolution | None:
     """Return the resolution in EXIF."""
     sides = exif.get(ExifTags.Base.XResolution), exif.get(ExifTags.Base.YResolution)
     found = _valid(sides, PER_INCH.get(exif.get(ExifTags.Base.ResolutionUnit, DEFAULT_UNIT)))
-    return None if found == (UNKNOWN, UNKNOWN) else found
+    unknown = 72.0  # the resolution that the EXIF standard prescribes where none is known [pixels an inch]
+    return None if found == (unknown, unknown) else found
 
 
 def _valid(density: Any, per_inch: float | None = 1.0) -> Resolution | None:

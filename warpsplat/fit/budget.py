@@ -16,26 +16,14 @@ from warpsplat.portable import elementary
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.scene import Basis, FloatArray, Kind
 
-TIMED_STEPS = 4
-"""Steps that are timed at each size."""
-
 BUDGET_MARGIN = 1.25
 """Time of a step with its update and its share of densification, over the time measured without."""
-
-MAX_ITERATIONS = 20_000
-"""Most steps of a fit with a deadline: more gain nothing."""
 
 HEAD_BYTES, FRACTION_BYTES = 150, 1.6
 """Bytes of a file without its shapes, and of a number without its digits before the point."""
 
 STYLE_BYTES = {Kind.FILL: 35, Kind.STROKE: 55}
 """Bytes of a shape without its coordinates."""
-
-SPARE_CURVES = 1.3
-"""Trained shapes over those expected to fit: the excess is removed with the surplus."""
-
-SHRINKAGE = 0.92
-"""Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser."""
 
 
 class Budget:
@@ -60,11 +48,12 @@ class Budget:
         self, state: FitState, settings: Settings, image: FloatArray, loss: CustomLoss | None = None
     ) -> Settings:
         """Time a few steps at each size without updates; return ``settings`` with as many steps as fit."""
+        timed_steps = 4  # steps that are timed at each size
         for phase in phases(settings, image.shape[1], image.shape[0]):
             step = Step(state, settings, Target(image, phase, loss=loss))
             begin = time.monotonic()
-            step.time(TIMED_STEPS)
-            self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / TIMED_STEPS)
+            step.time(timed_steps)
+            self.costs.append(BUDGET_MARGIN * (time.monotonic() - begin) / timed_steps)
         self._began, self._compiled = time.monotonic(), compile_seconds()
         return self._fit(settings, 0, 1.0)
 
@@ -85,7 +74,8 @@ class Budget:
         left = (self.deadline - time.monotonic()) / slowness
         # Time spent and time left add up to the whole fit; the steps made so far were the cheap, coarse ones.
         iterations = int((spent + max(left, 0.0)) / mean)
-        return replace(settings, iterations=min(max(iterations, done, CHECK_INTERVAL), MAX_ITERATIONS))
+        max_iterations = 20_000  # most steps of a fit with a deadline: more gain nothing
+        return replace(settings, iterations=min(max(iterations, done, CHECK_INTERVAL), max_iterations))
 
 
 def affordable_curves(settings: Settings, width: int, height: int) -> int:
@@ -100,7 +90,8 @@ def affordable_curves(settings: Settings, width: int, height: int) -> int:
     for _ in range(8):  # settles within a shape
         digits = max(0.0, 0.5 * float(elementary.log10(width * height / max(count, 1.0))))
         count = max(0.0, available / (STYLE_BYTES[settings.kind] + numbers * (FRACTION_BYTES + digits)))
-    return max(1, min(settings.curves, round(SPARE_CURVES * count)))
+    spare_curves = 1.3  # trained shapes over those expected to fit: the excess is removed with the surplus
+    return max(1, min(settings.curves, round(spare_curves * count)))
 
 
 def affordable(step: Step) -> Settings:
@@ -123,5 +114,7 @@ def affordable(step: Step) -> Settings:
         points = float(scene.point_counts()[splines].mean())
         lost = max(0.0, points - mean_points_at(settings, settings.iterations)) / (points + 2)
         per_shape -= lost * max(per_shape - STYLE_BYTES[settings.kind], 0.0)
-    count = round((settings.max_bytes - HEAD_BYTES) / max(SHRINKAGE * per_shape, 1.0))
+    # Bytes of a shape in the file over its bytes before the last steps: opacities become 1, the grid coarser.
+    shrinkage = 0.92
+    count = round((settings.max_bytes - HEAD_BYTES) / max(shrinkage * per_shape, 1.0))
     return replace(settings, curves=min(settings.curves, max(count, 1)))

@@ -20,18 +20,9 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.write import rounded
 
-MAX_ROUNDS = 40
-"""Nearly all images are clear after ten."""
-
 FIRST_MOVE, ROUNDS_PER_MOVE = 0.2, 8
 """Maximum move of a point in the first round [px], as spills are a fraction of a pixel wide, and rounds after
 which it is so much more."""
-
-PROBE_OPACITY = 0.02
-"""Opacity of all shapes while spilling is measured: so thin that none hides another."""
-
-NEIGHBOUR_WEIGHT = 0.05
-"""Weight of the pixels around one that should be empty: a viewer may show what has no coverage here."""
 
 
 def clear_empty(scene: Scene, target: FloatArray, settings: Settings, run: Run, per_pixel: float) -> Scene:
@@ -45,7 +36,8 @@ def clear_empty(scene: Scene, target: FloatArray, settings: Settings, run: Run, 
         (top, left), (height, width) = picture.corner, picture.pixels.shape[:2]
         empty[top : top + height, left : left + width] &= picture.pixels[..., 3] == 0
     best, fewest, renderer = scene, -1, None
-    for number in range(MAX_ROUNDS):
+    max_rounds = 40  # nearly all images are clear after ten
+    for number in range(max_rounds):
         if run.over():
             break
         tried = rounded(scene, per_pixel)
@@ -67,11 +59,14 @@ def _drawn_back(scene: Scene, spill: npt.NDArray[np.bool_], renderer: Renderer, 
 
     ``renderer``: of these shapes, with any values.
     """
-    renderer.parameters.assign(replace(scene, opacities=np.full_like(scene.opacities, PROBE_OPACITY)))
+    probe_opacity = 0.02  # opacity of all shapes while spilling is measured: so thin that none hides another
+    renderer.parameters.assign(replace(scene, opacities=np.full_like(scene.opacities, probe_opacity)))
     renderer.forward_complete()
     gradient = np.zeros((*spill.shape, 4), np.float32)
     around = cv2.dilate(spill.astype(np.uint8), np.ones((3, 3), np.uint8))
-    gradient[..., 3] = spill + NEIGHBOUR_WEIGHT * around
+    # Weight of the pixels around one that should be empty: a viewer may show what has no coverage here.
+    neighbour_weight = 0.05
+    gradient[..., 3] = spill + neighbour_weight * around
     renderer.write_image_grad(gradient)
     renderer.backward()
     slopes = renderer.parameters.gradients()["points"]

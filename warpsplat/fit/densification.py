@@ -17,11 +17,6 @@ from warpsplat.fit.step import Step
 from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import areas, bounds
 
-SURPLUS_ROUNDS = 4
-"""Rounds in which ``remove_surplus`` removes shapes: if two shapes hide each other, both cost 0 until one is
-gone."""
-
-
 BoolArray = npt.NDArray[np.bool_]
 
 PAIRS_PER_CHUNK = 1 << 18
@@ -75,7 +70,10 @@ def remove_surplus(step: Step, count: int) -> None:
     These are rendered.
     """
     state = step.state
-    for rounds_left in range(SURPLUS_ROUNDS, 0, -1):
+    # Rounds in which remove_surplus removes shapes: if two shapes hide each other, both cost 0 until one is
+    # gone.
+    surplus_rounds = 4
+    for rounds_left in range(surplus_rounds, 0, -1):
         excess = state.parameters.shape_count - count
         if excess <= 0:
             break

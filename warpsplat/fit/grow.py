@@ -18,23 +18,6 @@ from warpsplat.scene import FloatArray, IndexArray, Scene
 ERROR_LEVELS = 8
 """Levels that the error map is quantised to."""
 
-TOP_QUANTILE = 0.995
-"""Quantile of the error that the highest level begins at: single pixels do not set the scale."""
-
-RADIUS_RATIO = 1.2
-"""Radius of a new shape over that of the largest circle in its component of the error."""
-
-
-MIN_ASPECT = 8.0
-"""Length over width of a component that gets a stroke: on shorter ones fills are as good
-(docs/experiments.md)."""
-
-MIN_STROKE_SHARE = 0.8
-"""Minimum share of the component that a stroke has to cover ..."""
-
-MIN_ADVANTAGE = 2.0
-"""... and minimum ratio of that share to the one that a fill covers."""
-
 
 @dataclass(frozen=True)
 class Candidates:
@@ -73,7 +56,8 @@ def new_shapes(
     error = np.asarray(filters.gaussian_blur(error, 1.0), np.float32)
     found = candidates(error, mixed=settings.mixed)
     chosen = _without_overlap(found, error.shape, count)
-    places, radii = found.centres[chosen], np.maximum(RADIUS_RATIO * found.radii[chosen], 1.5)
+    radius_ratio = 1.2  # radius of a new shape over that of the largest circle in its component of the error
+    places, radii = found.centres[chosen], np.maximum(radius_ratio * found.radii[chosen], 1.5)
     missing = count - len(chosen)
     if missing > 0:
         weight = error.ravel().astype(np.float64) + 1e-12
@@ -103,7 +87,9 @@ def candidates(error: FloatArray, *, mixed: bool) -> Candidates:
     A component becomes its largest inscribed circle: a shape there covers error only, however branched the
     component is. If shapes may be ``mixed``, it becomes a stroke where that covers more.
     """
-    top = max(float(np.quantile(error, TOP_QUANTILE)), 1e-12)
+    # Quantile of the error that the highest level begins at: single pixels do not set the scale.
+    top_quantile = 0.995
+    top = max(float(np.quantile(error, top_quantile)), 1e-12)
     levels = [_level_set(error, top * level / ERROR_LEVELS, mixed) for level in range(1, ERROR_LEVELS)]
     arrays = [np.concatenate([getattr(found, f.name) for found in levels]) for f in fields(Candidates)]
     return Candidates(*arrays)
@@ -130,10 +116,16 @@ def _level_set(error: FloatArray, threshold: float, mixed: bool) -> Candidates:
     share = np.minimum(1.0, np.pi * radius**2 / size)
     centre = np.stack([column + 0.5, row + 0.5], axis=1)
     stroke: list[npt.NDArray[Any]] = [np.zeros(len(radius))] * 3
+    # Length over width of a component that gets a stroke: on shorter ones fills are as good
+    # (docs/experiments.md).
+    min_aspect = 8.0
+    min_stroke_share = 0.8  # minimum share of the component that a stroke has to cover ..
+    # ... and minimum ratio of that share to the one that a fill covers.
+    min_advantage = 2.0
     if mixed:
         middle, angle, length, width, covered = _bars(*np.divmod(pixel, error.shape[1]), label, number)
-        least = np.maximum(MIN_STROKE_SHARE, MIN_ADVANTAGE * share)
-        long = (length > MIN_ASPECT * width) & (covered > least)
+        least = np.maximum(min_stroke_share, min_advantage * share)
+        long = (length > min_aspect * width) & (covered > least)
         share = np.where(long, covered, share)
         centre = np.where(long[:, None], middle, centre)
         stroke = [angle, np.where(long, length, 0.0), width]

@@ -14,9 +14,6 @@ BLACK_WEIGHT = 0.05
 """Weight of a black pixel of a mask over that of a white one. Not 0: shapes would grow unchecked over black
 parts, and the surroundings of a face should still be recognisable."""
 
-EMPTY_WEIGHT = 8.0
-"""Weight of an empty pixel over others: what spills over an edge is visible on other backgrounds."""
-
 TEXTURE_SIGMA, TEXTURE_NOISE = 8.0, 4 / 255
 """Standard deviations: of the window in which texture is measured [px], and of colours in plain areas."""
 
@@ -49,8 +46,10 @@ def pixel_weights(image: FloatArray, mask: FloatArray | None, texture: float) ->
         shares = BLACK_WEIGHT + (1 - BLACK_WEIGHT) * np.clip(resize(mask, (width, height)), 0, 1)
         # Divided by the mean, so that a mask of one grey is exactly none.
         factors.append(np.asarray(shares / shares.mean(dtype=np.float64), np.float32))
+    # Weight of an empty pixel over others: what spills over an edge is visible on other backgrounds.
+    empty_weight = 8.0
     if image.shape[2] == 4:
-        factors.append(np.where(image[..., 3] == 0, np.float32(EMPTY_WEIGHT), np.float32(1)))
+        factors.append(np.where(image[..., 3] == 0, np.float32(empty_weight), np.float32(1)))
     return functools.reduce(np.multiply, factors) if factors else None
 
 

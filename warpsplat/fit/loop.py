@@ -38,17 +38,13 @@ def fit(
         run: how the work is carried out. If its ``checkpoint`` holds this fit, it continues from there.
         start: shapes to start from.
         rounding: how coordinates are rounded; None: no file is made of the result, nothing is rounded.
-
-    Raises:
-        CheckpointError: the run's ``checkpoint`` holds something else than the state of this fit.
     """
     training = Training(problem, run, start or Start(), rounding)
     checkpoint = run.checkpoint
     if checkpoint:
         checkpoint.begin()
         if checkpoint.result:
-            with checkpoint.reading():
-                return fit_from(checkpoint.result, training.scene)
+            return fit_from(checkpoint.result, training.scene)
     try:
         with failures_of(run.backend.device):
             return train(training)

@@ -24,12 +24,6 @@ from warpsplat.rendering.renderer import Renderer
 from warpsplat.rendering.tiles import from_tiles, read_tiles, to_tiles, write_tiles
 from warpsplat.scene import FloatArray, Scene
 
-PROBED = 8
-"""Every one of so many shapes is removed to measure a loss's curvature."""
-
-LEAST_BEND = 0.1
-"""Least part that the curvature has in what that costs, over the gradient's: some losses bend down."""
-
 
 @dataclass(frozen=True)
 class Quadratic:
@@ -139,7 +133,8 @@ class Objective:
         before, image = self.value(), read_tiles(film.image).copy()
         slopes = read_tiles(film.image_grad).copy()
         fewer = scene.opacities.copy()
-        fewer[::PROBED] = 0
+        probed = 8  # every one of so many shapes is removed to measure a loss's curvature
+        fewer[::probed] = 0
         renderer.parameters.assign(replace(scene, opacities=fewer))
         renderer.forward()
         change = read_tiles(film.image) - image
@@ -151,7 +146,9 @@ class Objective:
         renderer.parameters.assign(scene)
         renderer.forward()
         length = float(size.sum(dtype="float64")) / self._target.value_count
-        return max(bend, LEAST_BEND * abs(linear)) / length if length > 0 and linear else 1.0
+        # Least part that the curvature has in what that costs, over the gradient's: some losses bend down.
+        least_bend = 0.1
+        return max(bend, least_bend * abs(linear)) / length if length > 0 and linear else 1.0
 
 
 def loss_of_file(text: str, scene: Scene, problem: Problem, backend: Backend) -> float:

@@ -27,9 +27,6 @@ SIZE_UNITS = {
     **{"g": 1e9, "gb": 1e9, "gib": 1024**3},
 }
 
-MAX_DIGITS = 15
-"""Digits of a time or size in a text: beyond, it is a slip of the keys."""
-
 COLOR = re.compile(r"#([0-9a-f]{3}|[0-9a-f]{6})", re.IGNORECASE)
 
 COLOR_NAMES = (
@@ -242,7 +239,8 @@ def _quantity(value: object, units: Mapping[str, float], what: str, examples: st
     """Return a number with a unit in the smallest of ``units``."""
     found = QUANTITY.fullmatch(_words(value).strip())
     unit = units.get(found[2].lower()) if found else None
-    if found is None or unit is None or len(found[1]) > MAX_DIGITS:
+    max_digits = 15  # digits of a time or size in a text: beyond, it is a slip of the keys
+    if found is None or unit is None or len(found[1]) > max_digits:
         raise UsageError(f"not a {what}: {shown(value)}; write {examples}")
     return float(found[1]) * unit
 

@@ -23,9 +23,6 @@ GAIN_TO_TRY, GAIN_TO_KEEP = 1.0, 4.0
 """Minimum gain of a ramp over the worth of its bytes: while shapes are still added, and while the surplus is
 removed, when the shapes removed save about as much."""
 
-RADIAL_ADVANTAGE = 1.05
-"""Gain of a radial ramp over that of the linear one above which it is preferred."""
-
 SAME_COLOR = 2 / 255
 """Difference in each channel below which the colours of two stops are one."""
 
@@ -63,7 +60,8 @@ def _best_ramps(settings: Settings, solver: RampSolver, min_gain: float) -> tupl
     radial = solver.radial(min_gain)
     if settings.painting == "radial":
         return np.full(count, Paint.RADIAL, np.int32), radial
-    chosen = radial.gain > RADIAL_ADVANTAGE * linear.gain
+    radial_advantage = 1.05  # gain of a radial ramp over that of the linear one above which it is preferred
+    chosen = radial.gain > radial_advantage * linear.gain
     both = [(getattr(radial, f.name), getattr(linear, f.name)) for f in fields(Ramps)]
     ramps = Ramps(*(np.where(chosen.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in both))
     return np.where(chosen, Paint.RADIAL, Paint.LINEAR).astype(np.int32), ramps

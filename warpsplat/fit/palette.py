@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from warpsplat.fit.state import FitState
     from warpsplat.fit.step import Step
 
-KMEANS_ROUNDS = 20
-
-CHOICE_INTERVAL = 5
-"""Steps between two choices of colours; a choice takes as long as a step."""
-
-MIN_VISIBLE = 1e-6
-"""Minimum sum of a shape's squared visibility [pixels] at which it chooses a colour."""
-
 SOLID_OPACITY = 0.5
 """Minimum opacity of a pixel whose colour counts, and of a shape that is kept where all are made opaque."""
 
@@ -82,7 +74,8 @@ class Palette:
 
     def is_due(self, state: FitState) -> bool:
         """Return whether to choose: every few steps, and at once when shapes have come or gone."""
-        return state.step % CHOICE_INTERVAL == 0 or state.colored != state.parameters.revision
+        choice_interval = 5  # steps between two choices of colours; a choice takes as long as a step
+        return state.step % choice_interval == 0 or state.colored != state.parameters.revision
 
     def choose(self, step: Step) -> None:
         """Give each shape the colour with the least error."""
@@ -119,9 +112,10 @@ def best_colors(step: Step, scene: Scene) -> FloatArray:
     pulls = residual.sum(axis=(2, 3))
     total = np.bincount(seen.shape, weights=squares, minlength=len(scene))
     colors = scene.colors.copy()
+    min_visible = 1e-6  # minimum sum of a shape's squared visibility [pixels] at which it chooses a colour
     for channel in range(3):
         pull = np.bincount(seen.shape, weights=pulls[:, channel], minlength=len(scene))
-        colors[:, channel] += np.where(total > MIN_VISIBLE, pull / np.maximum(total, MIN_VISIBLE), 0)
+        colors[:, channel] += np.where(total > min_visible, pull / np.maximum(total, min_visible), 0)
     return colors
 
 
@@ -159,7 +153,8 @@ def main_colors(colors: FloatArray, weights: IndexArray, count: int) -> FloatArr
     while len(centers) < count:
         gain = totals * _distances(levels, centers).min(axis=1)
         centers = np.concatenate([centers, levels[[int(gain.argmax())]]])
-    for _ in range(KMEANS_ROUNDS):
+    kmeans_rounds = 20
+    for _ in range(kmeans_rounds):
         cluster = _distances(levels, centers).argmin(axis=1)
         size = np.bincount(cluster, weights=totals, minlength=count)
         sums = [np.bincount(cluster, weights=totals * levels[:, c], minlength=count) for c in range(3)]

@@ -14,17 +14,8 @@ from warpsplat.forms import form_of
 from warpsplat.portable import elementary, filters
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, FloatArray, Kind, Scene
 
-GRID_COVER = 1.3
-"""Area of the first shapes over that of the canvas: circles on a grid then leave few gaps."""
-
-GRID_JITTER = 0.25
-"""Maximum offset of a first shape along each axis, in cells of the grid."""
-
 STROKE_CUBICS, STROKE_ASPECT = 3, 3.0
 """Cubics in a new stroke (paper section 3.2, as in DiffVG), and its length over its width."""
-
-MIXED_STROKE_POINTS = 6
-"""Points of a new stroke among fills: a bar needs few, and with more of them it wobbles."""
 
 REDUCED_PIXELS, REDUCED_SIGMA = 400_000, 128.0
 """Maximum size of the image that the first shapes take colours and directions from [pixels], and maximum
@@ -33,9 +24,6 @@ standard deviation of its blur [px], whose cost grows with it."""
 COLOR_LEVELS, MAX_FLAT_COLORS, FLAT_SHARE = 32, 12, 0.98
 """Levels of a channel by which flat colours are distinguished, most colours of a flat image, and minimum
 share of its pixels that have one of these; the others antialias outlines."""
-
-MIN_REGION_SHARE = 1e-4
-"""Minimum area of a region that counts, over the area of the image."""
 
 SHAPES_PER_REGION, MIN_SIMPLE_CURVES = 8, 32
 """Shapes for a region of one colour, whose outline has corners and holes, and for the simplest flat image."""
@@ -62,12 +50,15 @@ def grid_scene(settings: Settings, target: FloatArray, count: int, rng: np.rando
     x = np.concatenate([(np.arange(n) + 0.5) / n for n in per_row]) * width
     y = np.repeat((np.arange(rows) + 0.5) / rows, per_row) * height
     cell = np.sqrt(width * height / count)
-    centres = np.stack([x, y], axis=1) + rng.uniform(-GRID_JITTER, GRID_JITTER, (count, 2)) * cell
+    grid_jitter = 0.25  # maximum offset of a first shape along each axis, in cells of the grid
+    centres = np.stack([x, y], axis=1) + rng.uniform(-grid_jitter, grid_jitter, (count, 2)) * cell
     centres = np.clip(centres, 0, [width, height])
     small, span = reduced(target, cell / 2)
     blurred = filters.gaussian_blur(small, max(cell / span / 4, 0.5))
     column, row = pixel_of(centres / span, small)
-    areas = np.full(count, GRID_COVER * cell * cell)
+    # Area of the first shapes over that of the canvas: circles on a grid then leave few gaps.
+    grid_cover = 1.3
+    areas = np.full(count, grid_cover * cell * cell)
     angles = shape_angles(settings, small, centres / span, cell / span / 2)
     colors = blurred[row, column]
     factory = ShapeFactory(settings, canvas_for(settings, target))
@@ -107,9 +98,10 @@ def simple_curves(target: FloatArray) -> int:
     if counts[colors].sum() < FLAT_SHARE * codes.size:
         return most
     regions = 0
+    min_region_share = 1e-4  # minimum area of a region that counts, over the area of the image
     for color in colors[counts[colors] > 0]:
         _, _, stats, _ = cv2.connectedComponentsWithStats((codes == color).astype(np.uint8), connectivity=4)
-        regions += int((stats[1:, cv2.CC_STAT_AREA] >= MIN_REGION_SHARE * codes.size).sum())
+        regions += int((stats[1:, cv2.CC_STAT_AREA] >= min_region_share * codes.size).sum())
     return min(most, max(MIN_SIMPLE_CURVES, SHAPES_PER_REGION * regions))
 
 
@@ -162,8 +154,10 @@ class ShapeFactory:
     ) -> Scene:
         """Return straight strokes."""
         basis, count = self.settings.form
+        # Points of a new stroke among fills: a bar needs few, and with more of them it wobbles.
+        mixed_stroke_points = 6
         if self.settings.mixed:
-            count = MIXED_STROKE_POINTS
+            count = mixed_stroke_points
         if basis == Basis.CUBIC:
             count = 3 * STROKE_CUBICS + 1
         direction = np.stack([elementary.cos(angles), elementary.sin(angles)], axis=1)

@@ -33,15 +33,8 @@ HALF_LENGTH = 2.0
 """Half the length of a ramp, in standard deviations of the visible pixels along it: evenly spread ones end at
 sqrt(3)."""
 
-MAX_CENTRE_DISTANCE = 4.0
-"""Maximum distance of a radial ramp's centre from the middle of its shape's box, in halves of the longer side
-of the box: beyond, a linear ramp is as good."""
-
 RIDGE = 1e-6
 """Added to variances, in the same unit: a shape of one pixel has no ramp."""
-
-SLOTS_PER_CHUNK = 4096
-"""Slots that are summed over at once: bounds the memory to some 40 MB."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +99,8 @@ class RampSolver:
         seen, scale = self._visible, self._viewport.scale
         at = np.arange(TILE) + 0.5
         chosen = np.flatnonzero(shapes[seen.shape])
-        for rows in np.split(chosen, range(SLOTS_PER_CHUNK, len(chosen), SLOTS_PER_CHUNK)):
+        slots_per_chunk = 4096  # slots that are summed over at once: bounds the memory to some 40 MB
+        for rows in np.split(chosen, range(slots_per_chunk, len(chosen), slots_per_chunk)):
             shape, tile = seen.shape[rows], seen.tile[rows]
             across, down = tile % self._viewport.tiles_x, tile // self._viewport.tiles_x
             x, y = (
@@ -193,7 +187,10 @@ class RampSolver:
         along, _, bound = self._steepest(3)
         bend = np.where(np.abs(along[:, 2]) > 1e-9, along[:, 2], 1e-9)
         centre = -along[:, :2] / (2 * bend[:, None])
-        chosen = (np.linalg.norm(centre, axis=1) < MAX_CENTRE_DISTANCE) & (bound > min_gain)
+        # Maximum distance of a radial ramp's centre from the middle of its shape's box, in halves of the
+        # longer side of the box: beyond, a linear ramp is as good.
+        max_centre_distance = 4.0
+        chosen = (np.linalg.norm(centre, axis=1) < max_centre_distance) & (bound > min_gain)
         count = len(chosen)
         gain, radii, slope = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
         for slots in self._slots(chosen):

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from warpsplat.fit.settings import Density, Settings
 from warpsplat.portable import elementary
 
-SIZE_CHOICES = 12
-"""Lengths of the shorter side that are tried for a reduced image."""
-
 TRAINING_SLACK = 2.0
 """``Phase.slack`` of a run: saves a fifth of the edges; a viewer rounds by 0.08 px as well."""
 
@@ -19,9 +16,6 @@ CHECK_INTERVAL = 10
 
 EVALUATE_FROM, EVALUATE_INTERVAL = 0.75, 50
 """Share of the run after which the file is evaluated as a viewer shows it, and steps in between."""
-
-REPAINT_SHARE = 0.1
-"""Share of the run between two searches for gradients, which take as long as several steps."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,8 @@ def _reduced_size(width: int, height: int, pixels: int) -> tuple[int, int]:
         return width, height
     short, long = min(width, height), max(width, height)
     most = max(1, round(short * math.sqrt(pixels / (width * height))))
-    choices = range(most, max(0, most - SIZE_CHOICES), -1)
+    size_choices = 12  # lengths of the shorter side that are tried for a reduced image
+    choices = range(most, max(0, most - size_choices), -1)
     best = min(choices, key=lambda n: round(abs(long * n / short - round(long * n / short)), 2))
     other = round(long * best / short)
     return (best, other) if width <= height else (other, best)
@@ -105,7 +100,9 @@ def repaints_at(settings: Settings, step: int) -> bool:
     density = settings.density
     if step + density.interval >= density.stop * settings.iterations:
         return True
-    share = REPAINT_SHARE * settings.iterations
+    # Share of the run between two searches for gradients, which take as long as several steps.
+    repaint_share = 0.1
+    share = repaint_share * settings.iterations
     return step // share > (step - density.interval) // share
 
 

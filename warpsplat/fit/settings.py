@@ -109,9 +109,6 @@ POLYGON_CORNERS = "[3-9]|[1-5][0-9]|6[0-4]"
 FORM_POINT_RATE, FORM_SURPLUS = 6.0, 2.0
 """Learning rate of the values of forms [px], and their ``Density.surplus``."""
 
-FORM_PIXELS = 8000
-"""Most pixels of the image in the last iterations for each shape of a form: more show nothing new."""
-
 FILL_POINT_RATE = 6.0
 """Learning rate of the points of splined fills [px]: each has only a share in the outline that is near it."""
 
@@ -746,6 +743,8 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
     preset = Settings(simplify="curves" not in given, **PRESETS[quality])
     rates = dict(preset.rates)
     renderer = given.get("renderer", "exact")
+    # Most pixels of the image in the last iterations for each shape of a form: more show nothing new.
+    form_pixels = 8000
     if renderer != "exact":
         preset = load_renderer(renderer).preset(preset)
     elif given.get("shape", CURVE) != CURVE:
@@ -754,7 +753,7 @@ def preset_for(quality: Quality, given: Mapping[str, Any]) -> Settings:
         preset = replace(preset, texture=0.0, density=density)
         curves = given.get("curves")
         if isinstance(curves, int):  # else none, or refused later
-            fine = max(preset.coarse_pixels, FORM_PIXELS * curves)
+            fine = max(preset.coarse_pixels, form_pixels * curves)
             preset = replace(preset, fine_pixels=min(preset.fine_pixels, fine))
     elif given.get("kind", Kind.FILL) == Kind.FILL:
         rates["points"] = FILL_POINT_RATE

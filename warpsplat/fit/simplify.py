@@ -11,9 +11,6 @@ import numpy.typing as npt
 from warpsplat.portable.sequences import interp
 from warpsplat.scene import Basis, FloatArray, IndexArray, Scene
 
-SAMPLES_PER_QUADRATIC = 4
-"""Samples of each quadratic by which the area between two outlines is computed."""
-
 MIN_SPLINE_POINTS = 4
 """Points that a spline keeps."""
 
@@ -63,7 +60,8 @@ def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
     around = np.arange(count)[:, None] + np.arange(-3, 4)
     around = around % count if closed else np.clip(around, 0, count - 1)
     window = points[:, around]  # [shape, point, 7, 2]
-    t = (np.arange(5 * SAMPLES_PER_QUADRATIC) + 0.5) / SAMPLES_PER_QUADRATIC
+    samples_per_quadratic = 4  # samples of each quadratic by which the area between two outlines is computed
+    t = (np.arange(5 * samples_per_quadratic) + 0.5) / samples_per_quadratic
     old = _quadratics(window, t)
     # Without the point, two quadratics are half as long again as before.
     t = interp(t, [0, 1, 2.5, 4, 5], np.arange(5))

@@ -60,16 +60,10 @@ class Training:
         return replace(scene, canvas=canvas), rng
 
     def begin(self) -> None:
-        """Record the first step, or that after the state in the run's checkpoint.
-
-        Raises:
-            CheckpointError: the checkpoint holds something else than the state of this fit.
-        """
+        """Record the first step, or that after the state in the run's checkpoint."""
         begin, backend, checkpoint = self.start.begin, self.run.backend, self.run.checkpoint
         if checkpoint and checkpoint.state:
-            with checkpoint.reading():
-                given = (self.scene, self.given, backend, self.base, begin, self.target)
-                self.step = step_from(checkpoint.state, *given)
+            self.step = step_from(checkpoint.state, self.scene, self.given, backend, self.target)
             return
         state, settings = self._first_state(), self.given
         if self.run.deadline < math.inf:

@@ -36,11 +36,6 @@ DASHES = "stroke-dasharray"
 FADE = 0.3
 """Time in which a shape fades in [s]."""
 
-MIN_STROKE_SECONDS = 0.02
-
-PIECES = 8
-"""Line segments that approximate a cubic's length."""
-
 
 class DrawnElement(NamedTuple):
     """An element, and when it is drawn."""
@@ -65,9 +60,10 @@ def schedule(root: ET.Element, seconds: float) -> list[DrawnElement]:
     mean = lengths[lengths > 0].mean() if (lengths > 0).any() else 1.0
     weights = np.where(lengths > 0, lengths / mean, 1.0)
     ends = np.cumsum(weights) / max(weights.sum(), 1e-9) * seconds
+    min_stroke_seconds = 0.02
     return [
         DrawnElement(
-            element, length, float(end - share), max(MIN_STROKE_SECONDS, float(share)) if length else FADE
+            element, length, float(end - share), max(min_stroke_seconds, float(share)) if length else FADE
         )
         for (element, length), end, share in zip(found, ends, np.diff(ends, prepend=0.0), strict=True)
     ]
@@ -98,7 +94,8 @@ def _property(element: ET.Element, name: str) -> str | None:
 
 def path_length(data: str) -> float:
     """Return the length of the longest subpath [own units]: dashes restart at each."""
-    t = np.linspace(0, 1, PIECES + 1)[:, None]
+    pieces = 8  # line segments that approximate a cubic's length
+    t = np.linspace(0, 1, pieces + 1)[:, None]
     s = 1 - t
     weights = np.concatenate([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
     longest = 0.0

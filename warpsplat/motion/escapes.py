@@ -18,17 +18,15 @@ HALF = "\N{UPPER HALF BLOCK}"
 CUBE = (48, 115, 155, 195, 235)
 """Levels between those of xterm's 6x6x6 cube of colours, which are 0, 95, 135, 175, 215 and 255."""
 
-FIRST_COLOR = 16
-"""Number of the cube's first colour; those before it differ between terminals."""
-
 
 def half_blocks(pixels: Pixels, *, true_color: bool) -> list[str]:
     """Return lines of characters with two pixels each: foreground above, background below."""
+    first_color = 16  # number of the cube's first colour; those before it differ between terminals
     if true_color:
         names = [[f"2;{r};{g};{b}" for r, g, b in row] for row in pixels.tolist()]
     else:
         red, green, blue = np.moveaxis(np.digitize(pixels, CUBE), 2, 0)
-        names = [[f"5;{color}" for color in row] for row in FIRST_COLOR + 36 * red + 6 * green + blue]
+        names = [[f"5;{color}" for color in row] for row in first_color + 36 * red + 6 * green + blue]
     lines = []
     for upper, lower in zip(names[::2], names[1::2], strict=True):
         styles = ["", *(f"\x1b[38;{top};48;{bottom}m" for top, bottom in zip(upper, lower, strict=True))]
@@ -37,17 +35,14 @@ def half_blocks(pixels: Pixels, *, true_color: bool) -> list[str]:
     return lines
 
 
-KITTY_CHUNK = 4096
-"""Most characters of base64 in one sequence."""
-
-
 def kitty(pixels: Pixels, columns: int, rows: int, number: int) -> str:
     """Return the picture by kitty's graphics protocol; the cursor stays where it is.
 
     ``number``: from 1; a picture replaces the previous one of the same number.
     """
     text = base64.b64encode(_png(pixels)).decode("ascii")
-    chunks = [text[i : i + KITTY_CHUNK] for i in range(0, len(text), KITTY_CHUNK)]
+    kitty_chunk = 4096  # most characters of base64 in one sequence
+    chunks = [text[i : i + kitty_chunk] for i in range(0, len(text), kitty_chunk)]
     # a=T: draw at once; f=100: a PNG; C=1: leave the cursor; q=2: no answers, which would be typed input.
     first = f"a=T,f=100,i={number},p=1,c={columns},r={rows},C=1,q=2,"
     return "".join(

@@ -30,12 +30,6 @@ RATES = {".gif": 12.5, ".webp": 15, ".mp4": 25}
 SIDES = {".gif": 480, ".webp": 800, ".mp4": 800}
 """Longest side if no width is given [px]; GIFs are large."""
 
-MIN_SIDE = 320
-"""Longest side of a film of a smaller image [px]."""
-
-MAX_PIXELS = 80_000_000
-"""Total of all frames: the GIF and WebP encoders hold them all, with four bytes per pixel."""
-
 Size = tuple[int, int]
 """Width and height [px]."""
 
@@ -65,10 +59,11 @@ def zoom_of(path: Path, size: tuple[float, float], width: int | None) -> float:
     The shorter side keeps at least a pixel as long as the longer one has at most ``WEBP_SIDE``, which is also
     the limit of H.264 encoders.
     """
+    min_side = 320  # longest side of a film of a smaller image [px]
     if width is not None:
         zoom = width / size[0]
     else:
-        zoom = min(SIDES[path.suffix.lower()], max(*size, MIN_SIDE)) / max(size)
+        zoom = min(SIDES[path.suffix.lower()], max(*size, min_side)) / max(size)
     return min(max(zoom, 1 / min(size)), WEBP_SIDE / max(size))
 
 
@@ -81,7 +76,9 @@ def zoom_and_size(text: str, path: Path, width: int | None) -> tuple[float, Size
 
 def frame_count(path: Path, size: Size, seconds: float) -> int:
     """Return the largest number of frames for a movement of ``seconds``."""
-    most = MAX_PIXELS // (size[0] * size[1])
+    # Total of all frames: the GIF and WebP encoders hold them all, with four bytes per pixel.
+    max_pixels = 80_000_000
+    most = max_pixels // (size[0] * size[1])
     return max(2, min(most, round(RATES[path.suffix.lower()] * seconds)))
 
 
@@ -111,17 +108,13 @@ def _opaque(picture: Image.Image) -> Image.Image:
     return Image.alpha_composite(Image.new("RGBA", picture.size, "white"), picture).convert("RGB")
 
 
-GIF_COLORS = 255
-"""Per frame; one of 256 is left for the pixels that did not change."""
-
-PALETTE_PIXELS = 10_000
-"""Pixels that a frame's palette is chosen from; all of them take nine times as long for half a decibel."""
-
-
 def _with_palette(picture: Image.Image) -> Image.Image:
-    step = max(1, math.isqrt(picture.width * picture.height // PALETTE_PIXELS))
+    # Pixels that a frame's palette is chosen from; all of them take nine times as long for half a decibel.
+    palette_pixels = 10_000
+    step = max(1, math.isqrt(picture.width * picture.height // palette_pixels))
     sample = picture.resize([max(1, side // step) for side in picture.size], Image.Resampling.NEAREST)
-    quantized = sample.quantize(GIF_COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    gif_colors = 255  # per frame; one of 256 is left for the pixels that did not change
+    quantized = sample.quantize(gif_colors, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     return quantized if step == 1 else picture.quantize(palette=quantized, dither=Image.Dither.NONE)
 
 

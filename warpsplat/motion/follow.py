@@ -15,12 +15,6 @@ import numpy as np
 from warpsplat.scene import FloatArray, IndexArray, Scene
 from warpsplat.scene.geometry import bounds
 
-COLOR_WEIGHT = 0.1
-"""Weight of a difference of colour against one of position in sides of the canvas."""
-
-MAX_DISTANCE = 0.1
-"""Between a shape and its match, in the same measure."""
-
 PAIRS_AT_ONCE = 1 << 18
 """Pairs of shapes compared together: bounds the memory."""
 
@@ -54,7 +48,8 @@ def features(scene: Scene) -> FloatArray:
     """Return what shapes are matched by: bounds, colour and opacity, shape (shape, 8)."""
     canvas = scene.canvas
     boxes = bounds(scene) / max(canvas.width, canvas.height)
-    paints = COLOR_WEIGHT * np.column_stack([scene.colors, scene.opacities])
+    color_weight = 0.1  # weight of a difference of colour against one of position in sides of the canvas
+    paints = color_weight * np.column_stack([scene.colors, scene.opacities])
     return np.column_stack([boxes, paints]).astype(np.float32)
 
 
@@ -69,7 +64,8 @@ def matches(before: FloatArray, after: FloatArray) -> list[tuple[int, int]]:
     there, back = nearest(before, after), nearest(after, before)
     rows = np.flatnonzero(back[there] == np.arange(len(before)))
     distances = np.linalg.norm(before[rows] - after[there[rows]], axis=1)
-    near = [(row, int(there[row])) for row in rows[distances < MAX_DISTANCE].tolist()]
+    max_distance = 0.1  # between a shape and its match, in the same measure
+    near = [(row, int(there[row])) for row in rows[distances < max_distance].tolist()]
     return [near[i] for i in longest_ascending([row for _, row in near])]
 
 

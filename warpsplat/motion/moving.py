@@ -21,11 +21,6 @@ from warpsplat.svg.data import integers, relative_smooth, spline_joints
 from warpsplat.svg.numbers import hex_colors, number
 from warpsplat.svg.write import OPACITY_DECIMALS, PAINTED, STROKE_ATTRIBUTES
 
-COVERING = 0.8
-"""Opacity from which an element stays until the next one of its shape is there. Translucent ones fade out as
-the next fades in: two of them cover too much; but two fading opaque ones let the background shine through.
-"""
-
 
 class PathForm(NamedTuple):
     """Properties that stay the same while a shape moves."""
@@ -98,6 +93,10 @@ def _add_keyframe(
     zoom = units / scene.canvas.width
     colors, movable = hex_colors(scene.colors), _movable(scene)
     twins = np.append(scene.twin[1:], 0)
+    # Opacity from which an element stays until the next one of its shape is there. Translucent ones fade out
+    # as the next fades in: two of them cover too much; but two fading opaque ones let the background shine
+    # through.
+    covering = 0.8
     for row in np.flatnonzero(scene.twin == 0).tolist():
         own = elements.setdefault(int(numbers[row]), [])
         if movable[row]:
@@ -113,7 +112,7 @@ def _add_keyframe(
                 _append(own, MovingElement(key, None, np.zeros(0, np.intp), markup=markup))
             alone = scene.take(np.arange(row, row + 1))
             opacity = float(alone.opacities[0] * alone.stop_opacities.min(initial=1.0))
-        own[-1].end, own[-1].covers = key, opacity >= COVERING
+        own[-1].end, own[-1].covers = key, opacity >= covering
 
 
 def _append(elements: list[MovingElement], element: MovingElement) -> None:

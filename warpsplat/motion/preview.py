@@ -42,25 +42,10 @@ CELLS = {"blocks": (1, 2), "iterm": (10, 20), "kitty": (10, 20)}
 TIME_SHARE = 0.05
 """Share of a run's time for drawing: the interval between two updates depends on how long one takes."""
 
-SHORTEST_INTERVAL = 0.1
-"""Between two updates [s]."""
-
-LONGEST_FIRST_INTERVAL = 1.0
-"""Between the first two updates [s]: the first takes longer than the others."""
-
 SAVE_CURSOR, RESTORE_CURSOR = "\x1b7", "\x1b8"
-
-MAX_ROWS = 32
-"""Height of a picture."""
-
-OTHER_LINES = 4
-"""Lines of the terminal that stay free."""
 
 MIN_COLUMNS, MIN_LINES = 8, 7
 """Smallest useful terminal."""
-
-MAX_FINISHED_SIDE = 1600
-"""Longer side at which the finished picture is rendered [px]: more than any terminal shows."""
 
 
 class Preview:
@@ -87,8 +72,11 @@ class Preview:
         now = self._clock()
         previous, self._cost = self._cost, now - begun
         wait = min(previous, self._cost) * (1 / TIME_SHARE - 1)  # a single slow update is no measure
+        shortest_interval = 0.1  # between two updates [s]
+        # Between the first two updates [s]: the first takes longer than the others.
+        longest_first_interval = 1.0
         self._next = now + max(
-            SHORTEST_INTERVAL, wait if previous < math.inf else min(wait, LONGEST_FIRST_INTERVAL)
+            shortest_interval, wait if previous < math.inf else min(wait, longest_first_interval)
         )
 
     def move_on(self) -> None:
@@ -154,7 +142,9 @@ def picture_size(terminal: os.terminal_size, width: int, height: int) -> tuple[i
     """
     if terminal.columns < MIN_COLUMNS or terminal.lines < MIN_LINES:
         return None
-    rows = min(terminal.lines - OTHER_LINES, MAX_ROWS)
+    max_rows = 32  # height of a picture
+    other_lines = 4  # lines of the terminal that stay free
+    rows = min(terminal.lines - other_lines, max_rows)
     columns = terminal.columns - 1  # some terminals wrap after the last one
     zoom = min(columns / width, 2 * rows / height)  # a character is twice as high as it is wide
     return min(max(1, round(width * zoom)), columns), min(max(1, round(height * zoom / 2)), rows)
@@ -233,10 +223,12 @@ class _NoticeHandler(logging.Handler):
 def show_finished(preview: Preview, result: Result, source: bytes | Path | None) -> None:
     """Show a result, beside its ``source`` if there is one; what cannot be read is left out."""
     side = max(result.scene.canvas.width, result.scene.canvas.height)
+    # Longer side at which the finished picture is rendered [px]: more than any terminal shows.
+    max_finished_side = 1600
     with contextlib.suppress(ImageError):
-        rendered = render_svg(result.svg, zoom=min(1.0, MAX_FINISHED_SIDE / side))
+        rendered = render_svg(result.svg, zoom=min(1.0, max_finished_side / side))
         original = None
         if source is not None:
             with contextlib.suppress(ImageError):
-                original = image_of(source, factor=max(1, side // MAX_FINISHED_SIDE))
+                original = image_of(source, factor=max(1, side // max_finished_side))
         preview.finish((premultiplied(rendered) / 255).astype(np.float32), original)

@@ -15,9 +15,6 @@ MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 HOLD = 2.0
 """Time that the finished picture is shown before a loop starts again [s]."""
 
-EARLY = 1.5
-"""Share of the run = share of the animation to this power: much changes early, little late."""
-
 
 def showings(moments: Sequence[int], ticks: int, seconds: float) -> dict[int, float]:
     """Return which recorded pictures an animation shows, by index, and how long each [s].
@@ -28,8 +25,9 @@ def showings(moments: Sequence[int], ticks: int, seconds: float) -> dict[int, fl
     duration.
     """
     found: dict[int, float] = {}
+    early = 1.5  # share of the run = share of the animation to this power: much changes early, little late
     for tick in range(ticks if moments else 0):
-        now = (moments[-1] + 1) * float(power((tick + 0.5) / ticks, EARLY))
+        now = (moments[-1] + 1) * float(power((tick + 0.5) / ticks, early))
         index = max(0, bisect_right(moments, now) - 1)
         found[index] = found.get(index, 0.0) + seconds / ticks
     return found

@@ -96,9 +96,6 @@ MAX_KEYFRAMES, MIN_KEYFRAMES = 20, 6
 MAX_BYTES = 3 << 20
 """Total of all keyframes, as long as that allows ``MIN_KEYFRAMES``."""
 
-MIN_UNITS = 1000
-"""Coordinate units along the longer side; moving shapes are seen only briefly."""
-
 FADE = 0.3
 """Time in which the file, if it has a background, fades in over the moving shapes [s]."""
 
@@ -170,4 +167,5 @@ def _parts(text: str) -> tuple[str, str]:
 def _coarse_grid(canvas: Canvas) -> float:
     """Return units per pixel for moving shapes."""
     side = max(canvas.width, canvas.height)
-    return next((units for units in GRIDS if units * side >= MIN_UNITS), GRIDS[-1])
+    min_units = 1000  # coordinate units along the longer side; moving shapes are seen only briefly
+    return next((units for units in GRIDS if units * side >= min_units), GRIDS[-1])

@@ -27,9 +27,6 @@ OUTSET = 1.1
 """How far outside of its outline a soft fill ends [canvas units]. Measured on discs of radii 2.5 to 20 px:
 0.6 (small and faint) to 1.8 (large and opaque)."""
 
-LEAST_TANGENT = 1e-6
-"""Length below which an outline has no direction [canvas units]."""
-
 LEVELS = np.linspace(0, 1, 201)
 """Opacities at which profiles are integrated."""
 
@@ -51,6 +48,7 @@ def _plateau(opacity: Floats) -> Floats:
 def _outlines(scene: Scene) -> FloatArray:
     """Return the scene's points, those of fills moved outwards by ``OUTSET``: shape (point, 2)."""
     points = scene.points.copy()
+    least_tangent = 1e-6  # length below which an outline has no direction [canvas units]
     for group in scene.alike():
         if group.kind != Kind.FILL:
             continue
@@ -59,7 +57,7 @@ def _outlines(scene: Scene) -> FloatArray:
         doubled_area = (ring[..., 0] * following[..., 1] - ring[..., 1] * following[..., 0]).sum(axis=1)
         along = following - np.roll(ring, 1, axis=1)
         outwards = np.stack([along[..., 1], -along[..., 0]], axis=2) * np.sign(doubled_area)[:, None, None]
-        length = np.maximum(np.linalg.norm(outwards, axis=2, keepdims=True), LEAST_TANGENT)
+        length = np.maximum(np.linalg.norm(outwards, axis=2, keepdims=True), least_tangent)
         rows = scene.first[group.shapes][:, None] + np.arange(ring.shape[1])
         points[rows] = (ring + OUTSET * outwards / length).astype(np.float32)
     return points

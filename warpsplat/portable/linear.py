@@ -16,12 +16,6 @@ Matrices = Any
 
 Result = npt.NDArray[Any]
 
-SWEEPS = 30
-"""Most rounds of Jacobi rotations; they converge quadratically, within ten."""
-
-LOOPED = 64
-"""Longest inner index that is summed term by term, rather than by NumPy."""
-
 
 def product(a: Matrices, b: Matrices) -> Result:
     """Return the matrix product ``a @ b``, with the shapes and types that ``@`` takes and gives."""
@@ -31,7 +25,8 @@ def product(a: Matrices, b: Matrices) -> Result:
     inner = rows.shape[-1]
     if inner != columns.shape[-2]:
         raise ValueError(f"shapes {a.shape} and {b.shape} have no product")
-    if inner > LOOPED:
+    looped = 64  # longest inner index that is summed term by term, rather than by NumPy
+    if inner > looped:
         total = (rows[..., :, :, None] * columns[..., None, :, :]).sum(axis=-2)
     else:
         shape = (*np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2]), rows.shape[-2], columns.shape[-1])
@@ -127,7 +122,8 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
         return np.swapaxes(left, -2, -1), values, np.swapaxes(right, -2, -1)
     size = matrix.shape[-1]
     rotation = np.zeros((*matrix.shape[:-2], size, size)) + np.eye(size)
-    for _ in range(SWEEPS):
+    sweeps = 30  # most rounds of Jacobi rotations; they converge quadratically, within ten
+    for _ in range(sweeps):
         done = True
         for p in range(size):
             for q in range(p + 1, size):

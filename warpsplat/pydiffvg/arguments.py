@@ -25,9 +25,6 @@ ZERO, ONE = 0, 1
 
 IDENTITY = np.eye(3).tolist()
 
-UNIFORM_TOLERANCE = 1e-3
-"""Relative difference of a transform's two scales up to which a stroke keeps one width."""
-
 
 class PaintStructure(NamedTuple):
     """Structure of a colour or gradient."""
@@ -266,7 +263,9 @@ def _transform(group: ShapeGroup, name: str, tensors: _Tensors) -> dict[str, Any
     if not matrix.requires_grad and matrix.tolist() == IDENTITY:
         return {"transform": None, "uniform": True}
     scales = np.linalg.svd(matrix[:2, :2].detach().cpu().numpy(), compute_uv=False)
-    uniform = bool(scales[1] >= (1 - UNIFORM_TOLERANCE) * scales[0])
+    # Relative difference of a transform's two scales up to which a stroke keeps one width.
+    uniform_tolerance = 1e-3
+    uniform = bool(scales[1] >= (1 - uniform_tolerance) * scales[0])
     return {"transform": tensors.add(matrix, (3, 3), name), "uniform": uniform}
 
 

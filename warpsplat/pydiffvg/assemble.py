@@ -12,9 +12,6 @@ from warpsplat.pydiffvg.layout import GradientTensors, Layout
 
 Tensor = torch.Tensor
 
-LEAST_SQUARE = 1e-3
-"""DiffVG divides by the squared length of a linear gradient [px^2], or by this where that is less."""
-
 
 def assemble(scene: SceneArguments, layout: Layout) -> dict[str, Tensor]:
     """Return the attributes of ``layout.scene`` by name, in pixels of the image."""
@@ -49,7 +46,9 @@ def _gradients(numbers: Tensor, gradients: GradientTensors, scale: Tensor) -> di
     first, second = numbers.index_select(0, gradients.points).view(-1, 2, 2).unbind(dim=1)
     axis = (second - first) * scale
     square = axis.square().sum(dim=1, keepdim=True).clamp_min(1e-12)
-    axis = axis * (LEAST_SQUARE / square).clamp_min(1.0).detach()
+    # DiffVG divides by the squared length of a linear gradient [px^2], or by this where that is less.
+    least_square = 1e-3
+    axis = axis * (least_square / square).clamp_min(1.0).detach()
     linear = torch.cat([first * scale, axis, -axis[:, 1:], axis[:, :1]], dim=1)
     center, radius = first * scale, second * scale
     zeros = torch.zeros_like(radius)

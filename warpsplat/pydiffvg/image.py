@@ -9,9 +9,6 @@ import numpy.typing as npt
 import torch
 from PIL import Image
 
-PNG_COMPRESSION = 1
-"""Scripts write an image at each step, and the best compression takes longer than the step."""
-
 
 def imwrite(
     img: torch.Tensor | npt.NDArray[np.floating],
@@ -40,4 +37,6 @@ def imwrite(
     if path.suffix.lower() in {".jpg", ".jpeg"}:
         pixels = pixels[:, :, :3]
     image = Image.fromarray(pixels.squeeze(2) if pixels.shape[2] == 1 else pixels)
-    image.save(path, compress_level=PNG_COMPRESSION)  # which other formats ignore
+    # Scripts write an image at each step, and the best compression takes longer than the step.
+    png_compression = 1
+    image.save(path, compress_level=png_compression)  # which other formats ignore

@@ -64,8 +64,6 @@ def optimized(
 
 
 MODES = ("move", "rigid", "similarity", "affine")
-TOLERANCE = 1e-3
-"""Difference of scales or shear up to which a mode can represent a transform."""
 
 
 class OptimizableTransform(torch.nn.Module):
@@ -87,9 +85,10 @@ class OptimizableTransform(torch.nn.Module):
             raise UsageError(f"transform_mode {shown(mode)} is none of {', '.join(MODES)}")
         rotation, scale, shear, translation = decompose(matrix.double())
         mirrored = scale[0] * scale[1] < 0
-        uniform = abs(abs(scale[0]) - abs(scale[1])) < TOLERANCE and abs(shear) < TOLERANCE
+        tolerance = 1e-3  # difference of scales or shear up to which a mode can represent a transform
+        uniform = abs(abs(scale[0]) - abs(scale[1])) < tolerance and abs(shear) < tolerance
         fits = {
-            "move": uniform and abs(abs(scale[0]) - 1) < TOLERANCE and not mirrored,
+            "move": uniform and abs(abs(scale[0]) - 1) < tolerance and not mirrored,
             "rigid": uniform and not mirrored,
             "similarity": uniform,
             "affine": True,

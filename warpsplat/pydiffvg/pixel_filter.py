@@ -12,12 +12,6 @@ from warpsplat.pydiffvg.diffvg import FilterType
 
 Tensor = torch.Tensor
 
-PARTS_PER_RADIUS = 4
-"""Parts that an image is rendered in. The weight of a part is exact, the image even within it."""
-
-PARTS_MAX = 8
-"""Most parts of a pixel, along x and y."""
-
 
 @dataclass(eq=False)
 class PixelFilter:
@@ -38,7 +32,10 @@ class PixelFilter:
             name = getattr(self.type, "name", self.type)
             raise UsageError(f"there is no pixel filter {name} of radius {radius:g}")
         own_area = self.type == FilterType.box and radius == 0.5
-        return None if own_area else min(PARTS_MAX, math.ceil(PARTS_PER_RADIUS / radius))
+        # Parts that an image is rendered in. The weight of a part is exact, the image even within it.
+        parts_per_radius = 4
+        parts_max = 8  # most parts of a pixel, along x and y
+        return None if own_area else min(parts_max, math.ceil(parts_per_radius / radius))
 
     def apply(self, image: Tensor, parts: int) -> Tensor:
         """Return the weighted means of an image in ``parts`` times finer pixels, shape (y, x, channel).

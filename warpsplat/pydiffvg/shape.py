@@ -121,20 +121,14 @@ def from_svg_path(
     return paths
 
 
-CLOSE = 1e-5
-"""Distance of a path's ends [path units] below which it counts as closed."""
-STRAIGHT = 1e-6
-"""Distance of a cubic's control points from those of a line or quadratic, relative to its coordinates, below
-which it is one."""
-
-
 def path_of(subpath: Subpath, *, is_closed: bool | None = None) -> Path:
     """Return a subpath, with lines and quadratics where its cubics are such.
 
     ``is_closed``: default: whether the subpath is closed or its ends meet.
     """
     points = subpath.points
-    meets = bool(np.abs(points[0] - points[-1]).max() < CLOSE)
+    close = 1e-5  # distance of a path's ends [path units] below which it counts as closed
+    meets = bool(np.abs(points[0] - points[-1]).max() < close)
     counts, chain = _segments(points)
     if is_closed is None:
         is_closed = subpath.is_closed or meets
@@ -154,8 +148,11 @@ def _segments(points: np.ndarray) -> tuple[list[int], list[Sequence[float]]]:
     """
     counts: list[int] = []
     chain = [points[0]]
+    # Distance of a cubic's control points from those of a line or quadratic, relative to its coordinates,
+    # below which it is one.
+    straight = 1e-6
     for p0, p1, p2, p3 in zip(points[:-1:3], points[1::3], points[2::3], points[3::3], strict=True):
-        tolerance = STRAIGHT * (1 + np.abs([p0, p1, p2, p3]).max())
+        tolerance = straight * (1 + np.abs([p0, p1, p2, p3]).max())
         first, second = 1.5 * p1 - 0.5 * p0, 1.5 * p2 - 0.5 * p3
         if np.abs(p1 - (2 * p0 + p3) / 3).max() < tolerance > np.abs(p2 - (p0 + 2 * p3) / 3).max():
             counts.append(0)

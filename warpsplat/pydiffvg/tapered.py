@@ -15,8 +15,6 @@ PIECES = 8
 """Cubics along either side of a segment."""
 ARCS = 2
 """Cubics of an end or join: two for half a circle leave the radius right to 3e-4."""
-SMALL = 1e-6
-"""Length of a derivative below which it has no direction."""
 
 
 def contour_sizes(segments: int, is_closed: bool) -> list[int]:
@@ -63,9 +61,10 @@ def _samples(segments: Tensor, radii: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     along = torch.einsum("tk,bskc->bstc", slopes, segments.diff(dim=2))
     # Where handles lie on their ends the derivative has no direction; the nearest chord then gives it.
     chord = torch.cat([center[:, :, 1:2] - center[:, :, :1], center.diff(dim=2)], dim=2)
-    along = torch.where(along.norm(dim=-1, keepdim=True) > SMALL, along, chord)
+    small = 1e-6  # length of a derivative below which it has no direction
+    along = torch.where(along.norm(dim=-1, keepdim=True) > small, along, chord)
     size = along.square().sum(dim=-1, keepdim=True)
-    unit = along * (size + SMALL**2).rsqrt()
+    unit = along * (size + small**2).rsqrt()
     normal = torch.stack([-unit[..., 1], unit[..., 0]], dim=-1)
     return center, normal, torch.einsum("tk,bsk->bst", weights, radii)[..., None]
 

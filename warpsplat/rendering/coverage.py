@@ -52,7 +52,7 @@ class ExactBuffers(CoverageBuffers):
     """Winding number of slots that no edge touches."""
     slot_near: wp.array = buffer(wp.int32, "stroke_slots", "row_lanes")
     segment_box: wp.array = buffer(wp.vec4, "segments")
-    """Of the rectangle of pixels that a stroke's segment may be nearest to."""
+    """Borders of the rectangle of pixels that a stroke's segment may be nearest to."""
     segment_ends: wp.array = buffer(wp.vec4, "segments")
     segment_sides: wp.array = buffer(wp.vec2, "segments")
     segment: wp.array = buffer(wp.int32, "stroke_slots", constants.TILE_PIXELS)

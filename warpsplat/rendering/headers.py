@@ -13,9 +13,6 @@ import threading
 import time
 from pathlib import Path
 
-POLL_INTERVAL = 0.01
-"""Seconds after which a thread that waits for the headers looks for them again."""
-
 
 class SharedHeaders:
     """A folder of precompiled headers for all threads that compile.
@@ -41,6 +38,7 @@ class SharedHeaders:
 
     def wait(self) -> str:
         """Return the folder once it has headers, or this thread is to make them."""
+        poll_interval = 0.01  # seconds after which a thread that waits for the headers looks for them again
         while True:
             with self._lock:
                 made = any(self._folder.glob("*.pch"))
@@ -48,7 +46,7 @@ class SharedHeaders:
                     self._maker = threading.get_ident()
                 if made or self._maker == threading.get_ident():
                     return str(self._folder)
-            time.sleep(POLL_INTERVAL)
+            time.sleep(poll_interval)
 
     def done(self) -> None:
         """Note that this thread has compiled its module, or failed: another one may make the headers."""

@@ -46,10 +46,10 @@ _temporary: list[str] = []
 
 
 _expected: list[_Build] = []
-"""What was announced and is not yet being compiled."""
+"""Builds that were announced and have not begun."""
 
 _builds: dict[Path, Future[None]] = {}
-"""What is being compiled, by the files that it makes."""
+"""Builds under way, by the files that they make."""
 
 _loading = threading.RLock()
 """One thread at a time loads, or asks for modules to be compiled."""
@@ -195,9 +195,6 @@ def _failure(error: Exception, device: wp.Device, *, compiled: bool) -> Exceptio
 LOCK = "warpsplat.lock"
 """An empty file in the cache; a byte of it is locked for each module that is being compiled."""
 
-LOCK_INTERVAL = 0.02
-"""Seconds after which a lock that another process holds is tried again."""
-
 
 @contextlib.contextmanager
 def alone_with(folder: Path) -> Iterator[None]:
@@ -229,11 +226,12 @@ def _lock(handle: int, place: int) -> bool:
     Two processes whose threads wait for each other's locks would be refused as deadlocked if they waited
     within the system.
     """
+    lock_interval = 0.02  # seconds after which a lock that another process holds is tried again
     while True:
         try:
             fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
         except (BlockingIOError, PermissionError):
-            time.sleep(LOCK_INTERVAL)
+            time.sleep(lock_interval)
         except OSError:
             return False
         else:

@@ -18,13 +18,6 @@ SHARE = 0.9
 MOST_SIDE = (1 << 31) - 1
 """Largest side of an image [px]: kernels count in 32 bits."""
 
-DRAWN_BYTES = 48
-"""Memory for each pixel of an image that is drawn, as measured: the film and its gradient, a slot of each
-tile, the finished image."""
-
-FINISHED_BYTES = 16
-"""Memory for each pixel of a finished image: four channels."""
-
 UNCHECKED = 1 << 28
 """Bytes that are always allowed: asking how many there are takes longer than drawing many an image."""
 
@@ -35,7 +28,11 @@ def check_memory(viewport: Viewport, device: wp.Device, count: int = 1) -> None:
     Raises:
         ResourceError: there is not.
     """
-    wanted = (DRAWN_BYTES + FINISHED_BYTES * (count - 1)) * viewport.pixel_count
+    # Memory for each pixel of an image that is drawn, as measured: the film and its gradient, a slot of each
+    # tile, the finished image.
+    drawn_bytes = 48
+    finished_bytes = 16  # memory for each pixel of a finished image: four channels
+    wanted = (drawn_bytes + finished_bytes * (count - 1)) * viewport.pixel_count
     if wanted <= UNCHECKED:
         return
     there = machine_memory() if device.is_cpu else device.free_memory

@@ -20,9 +20,9 @@ from warpsplat.scene import (
     Canvas,
     FloatArray,
     IndexArray,
+    KeptPicture,
     Kind,
     Paint,
-    Picture,
     Scene,
 )
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
@@ -203,7 +203,7 @@ class Parameters:
         return frozenset(Paint(k) for k in numbers_in(self._scene.paint))
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[KeptPicture, ...]:
         """``Scene.pictures``."""
         return self._scene.pictures
 

@@ -12,7 +12,7 @@ from warpsplat.kernels import constants
 from warpsplat.portable.filters import resize_area
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.tiles import to_tiles
-from warpsplat.scene import FloatArray, Picture
+from warpsplat.scene import FloatArray, KeptPicture
 
 TILE = constants.TILE
 
@@ -20,7 +20,9 @@ CLEAR = 1e-4
 """Opacity below which a colour is unknown."""
 
 
-def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, backend: Backend) -> dict[str, wp.array]:
+def picture_arrays(
+    pictures: Sequence[KeptPicture], viewport: Viewport, backend: Backend
+) -> dict[str, wp.array]:
     """Return the arrays of ``kernels.paint.picture``: the tiles of each picture in which it is visible."""
     boxes, tiles = [], []
     for one in pictures:
@@ -39,7 +41,7 @@ def picture_arrays(pictures: Sequence[Picture], viewport: Viewport, backend: Bac
     }
 
 
-def _tiles(picture: Picture, viewport: Viewport) -> tuple[tuple[int, int, int, int], FloatArray]:
+def _tiles(picture: KeptPicture, viewport: Viewport) -> tuple[tuple[int, int, int, int], FloatArray]:
     """Return the rectangle of tiles in which a picture is visible, and its straight colours there."""
     top, left = picture.corner
     height, width = picture.pixels.shape[:2]

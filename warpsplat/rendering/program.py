@@ -23,9 +23,6 @@ from warpsplat.rendering.kernel_cache import expect, load
 
 log = logging.getLogger(__name__)
 
-PIECES_PER_THREAD = 4
-"""A split launch is cut finer than there are threads, so that uneven pieces balance."""
-
 
 @dataclass(frozen=True)
 class Launch:
@@ -89,7 +86,9 @@ class Program:
         arguments = bind(kernel, sources, values)
         self._arrays.append(arguments)
         expect(kernel, self.device)
-        count = min(self.threads * PIECES_PER_THREAD, shape[0]) if split and self.threads > 1 else 1
+        # A split launch is cut finer than there are threads, so that uneven pieces balance.
+        pieces_per_thread = 4
+        count = min(self.threads * pieces_per_thread, shape[0]) if split and self.threads > 1 else 1
         self._added.append(functools.partial(self._record, self.stage, kernel, shape, arguments, count))
 
     def _record(

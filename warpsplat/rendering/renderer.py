@@ -25,14 +25,10 @@ from warpsplat.scene import GRADIENTS, FloatArray, IndexArray, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
 from warpsplat.scene.scene import IntArray
 
-GROWTH = 1.5
-"""Capacity over need when an array has to grow, so that a growing scene seldom does."""
 SLOT_LIMIT = 1_500_000
 """Most slots before a scene is refused: 1.3 KiB each, 2.4 for strokes, and 1 more on a GPU; up to 5 GiB."""
 SAMPLE_LIMIT = 16_000_000
 """Most Gaussians or vertices (about 120 bytes each, 200 with styled strokes) before a scene is refused."""
-SLOTS_PER_SHAPE = 8
-"""First guess of the need, besides one for each tile."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +94,9 @@ class Renderer:
         self.needed_samples, self.needed_slots = self._needed[:1], self._needed[1:]
         self._needed_on_host = self._needed.numpy() if self.backend.device.is_cpu else None
         shapes = parameters.shape_count
+        slots_per_shape = 8  # first guess of the need, besides one for each tile
         first_guess = Capacity(
-            model.samples_per_shape * shapes, viewport.tile_count + SLOTS_PER_SHAPE * shapes
+            model.samples_per_shape * shapes, viewport.tile_count + slots_per_shape * shapes
         )
         self._build(capacity or first_guess)
 
@@ -247,7 +244,8 @@ class Renderer:
         if samples <= now.samples and slots <= now.slots:
             return False
         self._needed.zero_()
-        self._build(Capacity(max(now.samples, int(GROWTH * samples)), max(now.slots, int(GROWTH * slots))))
+        growth = 1.5  # capacity over need when an array has to grow, so that a growing scene seldom does
+        self._build(Capacity(max(now.samples, int(growth * samples)), max(now.slots, int(growth * slots))))
         return True
 
     def capacity_and_need(self) -> tuple[Capacity, Capacity]:

@@ -33,9 +33,6 @@ log = logging.getLogger(__name__)
 DIGESTS = ("image", "mask", "svg")
 """Parts of ``identity`` that are digests."""
 
-VALUE_CHARACTERS = 40
-"""Characters of a value in a message."""
-
 
 @dataclass(frozen=True)
 class CheckpointFile:
@@ -90,31 +87,29 @@ class CheckpointFile:
             log.warning("%s: no checkpoint exists yet: starts from the beginning", self.path)
 
         def write(content: Content) -> None:
-            header = {"version": __version__, "device": device, "run": run, **content.numbers}
+            whole = {"version": __version__, "device": device, "run": run, **content}
             try:
-                write_atomically(self.path, pack(header, content.arrays))
+                write_atomically(self.path, pack(whole))
             except OutputError as error:  # a failed save must not end hours of work
                 log.warning("%s; the run continues without this checkpoint", error)
 
-        checkpoint = Checkpoint(str(self.path), write, self.every, saved)
+        checkpoint = Checkpoint(write, self.every, saved)
         if saved and checkpoint.is_empty:
             log.warning("%s: nothing to resume from: starts from the beginning", self.path)
         return checkpoint
 
     def _read(self, run: Mapping[str, Any], device: str) -> Content:
-        header, arrays = unpack(self.path)
-        if header.get("version") != __version__:
-            made = str(header.get("version"))[:20]
-            raise UsageError(f"{self.path}: made by warpsplat {made}, this is {__version__}")
-        before = header.get("run")
-        for name, was, now in differences(before if isinstance(before, dict) else {}, run):
+        saved = unpack(self.path)
+        if saved["version"] != __version__:
+            raise UsageError(f"{self.path}: made by warpsplat {saved['version']}, this is {__version__}")
+        for name, was, now in differences(saved["run"], run):
             detail = f" ({was}, now {now})" if name not in DIGESTS else ""
             raise UsageError(f"{self.path}: belongs to another run: {name} differs{detail}")
-        if header.get("device") != device:
+        if saved["device"] != device:
             log.warning(
                 "%s: was made on another device; the run continues, but its bytes will differ", self.path
             )
-        return Content(header, arrays)
+        return saved
 
 
 def open_checkpoint(
@@ -157,9 +152,10 @@ def _digest(image: FloatArray) -> str:
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield the names of the values that differ, and both values, for people."""
+    value_characters = 40  # characters of a value in a message
     for name in {**now, **before}:
         old, new = before.get(name), now.get(name)
         if isinstance(old, dict) and isinstance(new, dict):
             yield from differences(old, new)
         elif old != new:
-            yield name.replace("_", "-"), str(old)[:VALUE_CHARACTERS], str(new)[:VALUE_CHARACTERS]
+            yield name.replace("_", "-"), str(old)[:value_characters], str(new)[:value_characters]

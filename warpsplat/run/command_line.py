@@ -12,9 +12,6 @@ from warpsplat.errors import UsageError
 from warpsplat.fit.settings import DEFAULT_QUALITY, QUALITIES, Quality, Settings, levels_of, make_settings
 from warpsplat.run.options import KINDS, OPTIONS, with_preset
 
-REFINE_ITERATIONS = 200
-"""Default number of steps of ``warpsplat refine``."""
-
 
 def vectorize_command(
     settings: Settings, image: str, output: str, *further: str, preset: str | None = None
@@ -52,7 +49,8 @@ def several_command(
 
 def refine_command(settings: Settings, svg: str, image: str, output: str, *further: str) -> str:
     """Return the command that makes ``output`` of ``svg`` and ``image``."""
-    default = make_settings(iterations=REFINE_ITERATIONS)
+    refine_iterations = 200  # default number of steps of warpsplat refine
+    default = make_settings(iterations=refine_iterations)
     names = ("iterations", *(option.field for option in OPTIONS if option.refine))
     given = {
         name: value

@@ -43,14 +43,6 @@ STRIPS = 96 << 20
 FILE_STRIPS = 96 << 20
 """Bytes of the strips of a file that are drawn side by side."""
 
-TRAINED = 160
-"""Bytes per pixel of the finest size: target, render, gradient, weights, error maps, the file's render."""
-
-SLOT = 1500
-SLOT_STROKE = 1100
-SLOT_PAINT = 4200
-"""Bytes per slot (``rendering.renderer``), and what strokes and gradients add."""
-
 SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 """Slots of a fit per tile, per root of tiles times shapes, and per shape."""
 
@@ -60,14 +52,8 @@ SHAPE = 24 << 10
 TRACED = {"drawing": 420, "line": 420, "silhouette": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
 
-CUT_OUT = 64
-"""Bytes per pixel of removing the background of a photograph."""
-
 LANES = 1 << 10
 """Bytes per slot that a GPU adds, twice with gradients: those of colours, by lane."""
-
-TRACED_ON_GPU = 160
-"""Bytes per pixel of the renders of a drawing, on a GPU."""
 
 ON_GPU = 32 << 20
 """Bytes that a run takes on a GPU however small its image is: for sorting, and a surplus of shapes."""
@@ -81,10 +67,6 @@ what a file adds that is not drawn in strips."""
 
 SSIMULACRA2 = 200
 """Bytes per pixel of measuring SSIMULACRA2."""
-
-REFINED = 40
-"""Additional bytes per pixel of refining an SVG: pictures of the SVG and of the scene that was read, a file
-that is not drawn in strips, and the image on a colour."""
 
 CLEARED = 150
 """Bytes per pixel of finding pixels that should be empty (``fit.clear``), where an SVG is refined against an
@@ -105,8 +87,9 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
     reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
     traced = TRACED.get(settings.subject)
     working = traced * worked if traced else _fitting(facts, settings, factor)
+    cut_out = 64  # bytes per pixel of removing the background of a photograph
     if settings.removal and not traced:
-        working = max(working, CUT_OUT * worked)
+        working = max(working, cut_out * worked)
     scoring = _scoring(facts, settings, worked)
     if mask:  # which is read beside the image, and held
         masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2
@@ -118,7 +101,8 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
 
 def need_on_gpu(facts: ImageFacts, settings: Settings, factor: int = 1) -> int:
     """Estimate the peak of a run on a GPU [bytes] from above."""
-    traced = TRACED_ON_GPU * facts.width * facts.height / factor**2
+    traced_on_gpu = 160  # bytes per pixel of the renders of a drawing, on a GPU
+    traced = traced_on_gpu * facts.width * facts.height / factor**2
     working = traced if settings.subject in TRACED else _fitting(facts, settings, factor, LANES)
     return round(ON_GPU + working)
 
@@ -143,11 +127,13 @@ def _fitting(facts: ImageFacts, settings: Settings, factor: int, lanes: int = 0)
     pixels, curves = phase.width * phase.height, settings.curves
     tiles = pixels / 256
     slots = SLOTS_A_TILE * tiles + SLOTS_BETWEEN * math.sqrt(tiles * curves) + SLOTS_A_SHAPE * curves
-    slot = SLOT + lanes
-    slot += SLOT_STROKE if settings.kind == Kind.STROKE or settings.mixed else 0
-    slot += SLOT_PAINT + lanes if settings.painting != "flat" else 0
+    slot = 1500 + lanes  # bytes per slot (rendering.renderer), and what strokes and gradients add
+    slot += 1100 if settings.kind == Kind.STROKE or settings.mixed else 0
+    slot += 4200 + lanes if settings.painting != "flat" else 0
     levels = len(settings.levels) or 1
-    return levels * 1.5 * slots * slot + TRAINED * pixels + SHAPE * curves
+    # Bytes per pixel of the finest size: target, render, gradient, weights, error maps, the file's render.
+    trained = 160
+    return levels * 1.5 * slots * slot + trained * pixels + SHAPE * curves
 
 
 def _scoring(facts: ImageFacts, settings: Settings, pixels: float) -> float:
@@ -273,7 +259,10 @@ def need_refined(facts: ImageFacts, settings: Settings) -> int:
     """Return the bytes of refining an SVG of as many shapes as usual."""
     pixels = facts.width * facts.height
     cleared = PROGRAM + CLEARED * pixels if facts.channels == 4 else 0
-    return max(need(facts, settings) + REFINED * pixels, cleared)
+    # Additional bytes per pixel of refining an SVG: pictures of the SVG and of the scene that was read, a
+    # file that is not drawn in strips, and the image on a colour.
+    refined = 40
+    return max(need(facts, settings) + refined * pixels, cleared)
 
 
 def check_refined(

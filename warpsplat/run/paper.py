@@ -26,7 +26,7 @@ from warpsplat.svg.write import on_background
 
 @dataclass(frozen=True)
 class Paper:
-    """What a file is drawn on."""
+    """The sheet that a file is drawn on, or the size of the picture alone."""
 
     settings: Settings
     size: tuple[int, int]
@@ -54,7 +54,7 @@ class Paper:
 
     @property
     def sheet(self) -> Sheet:
-        """What the file is drawn on: the sheet of the settings, or one of the picture's own size."""
+        """The sheet of the settings, or one of the picture's own size."""
         settings = self.settings
         if settings.size or settings.page:
             return sheet_for(settings.size, settings.page, settings.units, *self.size)

@@ -103,14 +103,8 @@ def prepare(
     elif chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
         target, notes = without_background(target, chosen, notes)
         reduction = reduction and replace(reduction, whole=None)  # which has its background
-    if chosen.remove_background and is_transparent:
-        notes += ("the image is transparent, so that no background was removed",)
-    if loss and chosen.subject != "photo":
-        raise UsageError(f"subject {chosen.subject} and {OWN_LOSS} cannot be combined")
-    if importance is not None and chosen.subject != "photo":
-        notes += (no_effect(["importance"], chosen.subject),)
-    if target.shape[2] == 4 and not target[..., 3].any():
-        notes += ("every pixel is fully transparent, so the file is empty",)
+    removes_none = is_transparent and bool(chosen.remove_background)
+    notes += _unexpected(target, chosen, removes_none=removes_none, is_masked=importance is not None)
     resolution = facts.resolution if facts else None
     problem = Problem(target, chosen, loss=loss, metadata=key)
     prepared = PreparedImage(problem, why, notes, reduction, name, resolution)
@@ -119,6 +113,18 @@ def prepare(
     mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1
     mask = load_importance(importance, *prepared.size, mask_name, mask_reduced)
     return replace(prepared, problem=replace(prepared.problem, importance=mask))
+
+
+def _unexpected(
+    target: FloatArray, settings: Settings, *, removes_none: bool, is_masked: bool
+) -> tuple[str, ...]:
+    """Return notes on a background or a mask without effect, and on an image without anything in it."""
+    notes = ["the image is transparent, so that no background was removed"] if removes_none else []
+    if is_masked and settings.subject != "photo":
+        notes.append(no_effect(["importance"], settings.subject))
+    if target.shape[2] == 4 and not target[..., 3].any():
+        notes.append("every pixel is fully transparent, so the file is empty")
+    return tuple(notes)
 
 
 def load_target(source: ImageSource, name: str | None, background: str) -> FloatArray:
@@ -191,6 +197,9 @@ def choose_subject(
     """Return ``settings`` with a subject, the reason for it (empty if the subject was given), and notes.
 
     ``Option.elsewhere`` decides about options that have no effect on the subject that is detected.
+
+    Raises:
+        UsageError: the subject is none that is fitted, by which a loss could go.
     """
     subject, why, notes = settings.subject, "", list[str]()
     if subject == "auto":
@@ -205,6 +214,8 @@ def choose_subject(
                 f"without {'them' if asking[1:] else 'it'} the image would be traced"
             )
             subject = "photo"
+    if loss and subject != "photo":
+        raise UsageError(f"subject {subject} and {OWN_LOSS} cannot be combined")
     without = settings.unsuited(subject)
     if without:
         notes.append(no_effect([given.name for given in without], subject))

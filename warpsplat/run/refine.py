@@ -18,7 +18,7 @@ from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import for_machines, show
 from warpsplat.fit.loop import fit
 from warpsplat.fit.objective import loss_of_file
-from warpsplat.fit.problem import Problem, Run, Start
+from warpsplat.fit.problem import Fit, Problem, Run, Start
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
@@ -43,12 +43,6 @@ from warpsplat.svg.write import minified, shortened, write_svg
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-MIN_ALIKE = 25.0
-"""Least PSNR [dB] of the scene that was read against the SVG; one that was read in full has over 40."""
-
-REFINE_RATE = 0.5
-"""Learning rate of points [px]: the shapes are nearly where they should be."""
 
 
 @takes(RefineOptions)
@@ -137,15 +131,8 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     judged = problem.loss or settings.loss != "l2"  # on the device
     if run.failures and (judged or not made.iterations):
         raise run.failures[0]
+    made = _cleared(made, problem, run)
     refined = made.scene
-    if target.shape[2] == 4 and not made.interrupted:
-        try:
-            with failures_of(run.backend.device):
-                refined = clear_empty(refined, target, settings, run, made.per_pixel)
-            made = replace(made, interrupted=run.stopped())
-        except DeviceError as failure:
-            run.failures.append(failure)
-            made = replace(made, interrupted=True)
     if checkpoint and made.interrupted:
         checkpoint.save()
     release_memory()
@@ -184,14 +171,28 @@ def refine_svg(text: str, problem: Problem, run: Run, name: str, *, keep: bool =
     )
 
 
+def _cleared(made: Fit, problem: Problem, run: Run) -> Fit:
+    """Return a fit whose outlines are drawn back from where the image is empty, unless the device fails."""
+    if problem.target.shape[2] != 4 or made.interrupted:
+        return made
+    try:
+        with failures_of(run.backend.device):
+            scene = clear_empty(made.scene, problem.target, problem.settings, run, made.per_pixel)
+        return replace(made, scene=scene, interrupted=run.stopped())
+    except DeviceError as failure:
+        run.failures.append(failure)
+        return replace(made, interrupted=True)
+
+
 def _settings(settings: Settings, count: int) -> Settings:
     """Return the settings of a fit of ``count`` shapes that all stay."""
+    refine_rate = 0.5  # learning rate of points [px]: the shapes are nearly where they should be
     return replace(
         settings,
         curves=min(count, 100_000),
         coarse=0.0,
         density=Density(interval=0),
-        rates={**settings.rates, "points": REFINE_RATE},
+        rates={**settings.rates, "points": refine_rate},
         renderer="exact",
         texture=0.0,  # the unweighted loss decides whether a result is better
     )
@@ -236,5 +237,7 @@ def _check_read(text: str, scene: Scene, has_background: bool) -> None:
         a, b = (on_white(each.crop((0, rows.start, given.width, rows.stop))) for each in (given, read))
         error += float(np.square(a - b).sum())
     alike = decibels(error / (3 * given.width * given.height))
-    if alike < MIN_ALIKE:
+    # Least PSNR [dB] of the scene that was read against the SVG; one that was read in full has over 40.
+    min_alike = 25.0
+    if alike < min_alike:
         raise ImageError(f"contains something that is not supported ({alike:.1f} dB from what could be read)")

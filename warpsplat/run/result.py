@@ -21,9 +21,6 @@ from warpsplat.run.explained import Explained
 from warpsplat.run.formats import write_named
 from warpsplat.scene import Scene
 
-KEY_BYTES = 6
-"""Bytes of a key: two jobs have the same one by a chance of one in 2^48."""
-
 STOPPED = "stopped"
 """Key of a result that was cut short."""
 
@@ -172,4 +169,5 @@ def job_key(settings: Settings, source: bytes, mask: bytes | None = None) -> str
     """Return the key of a result: a hash of program version, settings, and bytes of image and mask."""
     masked = "" if mask is None else f"{hashlib.sha256(mask).hexdigest()} "
     digest = hashlib.sha256(f"{__version__} {settings.fingerprint()} {masked}".encode() + source).digest()
-    return base64.b64encode(digest[:KEY_BYTES], altchars=b"._").decode()
+    key_bytes = 6  # bytes of a key: two jobs have the same one by a chance of one in 2^48
+    return base64.b64encode(digest[:key_bytes], altchars=b"._").decode()

@@ -17,12 +17,6 @@ from warpsplat.scene import FloatArray
 NEXT: dict[Subject, Subject] = {"pixel": "drawing", "drawing": "photo"}
 """Subject that is tried next, by the one whose file shows too little."""
 
-BYTES_PER_PIXEL = 4
-"""Bytes of a fit that shows as much as a pixel of a thumbnail, or more."""
-
-MUCH = 3.0
-"""How much farther from the image than that a file must be, for its subject to be the wrong one [dB]."""
-
 
 def other_subject(made: Fit, problem: Problem) -> Subject | None:
     """Return another subject for an image of which a file shows much less than one of that size could.
@@ -36,10 +30,13 @@ def other_subject(made: Fit, problem: Problem) -> Subject | None:
         return None  # what was asked for may show little
     text = finished(made.scene, settings, made.per_pixel)
     height, width = target.shape[:2]
-    scale = math.sqrt(len(text.encode()) / (BYTES_PER_PIXEL * height * width))
+    bytes_per_pixel = 4  # bytes of a fit that shows as much as a pixel of a thumbnail, or more
+    scale = math.sqrt(len(text.encode()) / (bytes_per_pixel * height * width))
     if scale >= 1:
         return None
-    enough = _thumbnail_psnr(target, (max(1, int(scale * width)), max(1, int(scale * height)))) - MUCH
+    # How much farther from the image than that a file must be, for its subject to be the wrong one [dB].
+    much = 3.0
+    enough = _thumbnail_psnr(target, (max(1, int(scale * width)), max(1, int(scale * height)))) - much
     if psnr_of_file(text, target) >= enough:
         return None
     # A drawing is sharp where the image may not be.

@@ -28,18 +28,15 @@ from warpsplat.search.series import Series
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-MOST_NUMBERS = 16
-"""Most numbers of shapes in one run."""
-
-
 OWN_NUMBER = {"line", "pixel", "silhouette"}
 """Subjects whose images decide how many shapes there are."""
 
 
 def check_several(settings: Settings, numbers: Sequence[int]) -> None:
     """Raise ``UsageError`` unless there can be a run with several numbers of shapes."""
-    if not 1 <= len(numbers) <= MOST_NUMBERS:
-        raise UsageError(f"curves: from 1 to {MOST_NUMBERS} numbers, not {len(numbers)}")
+    most_numbers = 16  # most numbers of shapes in one run
+    if not 1 <= len(numbers) <= most_numbers:
+        raise UsageError(f"curves: from 1 to {most_numbers} numbers, not {len(numbers)}")
     for number in numbers:
         replace(settings, curves=number, levels=())
         if numbers.count(number) > 1:

@@ -16,14 +16,8 @@ from warpsplat.scene import FloatArray
 if TYPE_CHECKING:
     from warpsplat.run.result import Result
 
-RELEASE_INTERVAL = 10
-"""Progress reports from one release of free memory to the next: a release takes as long as a step does."""
-
 TAIL_SECONDS, TAIL_PER_PIXEL = 0.3, 3e-7
 """Part of a time budget that the last step, exporting and scoring take [s]."""
-
-CLEARING_SHARE = 0.1
-"""Share of the time of an image with transparency that is left to draw outlines back (``fit/clear.py``)."""
 
 
 def recorded(run: Run, history: list[Progress]) -> Run:
@@ -32,7 +26,10 @@ def recorded(run: Run, history: list[Progress]) -> Run:
     def record(now: Progress) -> Progress:
         now = replace(now, work=max(now.work, history[-1].work) if history else now.work)
         history.append(replace(now, snapshot=None))  # which holds a run's arrays
-        if len(history) % RELEASE_INTERVAL == 0:
+        # Progress reports from one release of free memory to the next: a release takes as long as a step
+        # does.
+        release_interval = 10
+        if len(history) % release_interval == 0:
             release_memory()
         return now
 
@@ -76,4 +73,6 @@ def failed(run: Run, name: str, result: Result) -> DeviceError:
 
 def before_clearing(run: Run, target: FloatArray) -> Run:
     """Return the run of a fit, after which there is time to draw outlines back from what is transparent."""
-    return run.within(1 - CLEARING_SHARE) if target.shape[2] == 4 else run
+    # Share of the time of an image with transparency that is left to draw outlines back (fit/clear.py).
+    clearing_share = 0.1
+    return run.within(1 - clearing_share) if target.shape[2] == 4 else run

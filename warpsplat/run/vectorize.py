@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from warpsplat.errors import DeviceError, UsageError, naming
 from warpsplat.files.remote import path_of
@@ -20,7 +20,7 @@ from warpsplat.native import release_memory
 from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
-from warpsplat.run.explained import explained
+from warpsplat.run.explained import Explained, explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
 from warpsplat.run.paper import bridge_notes, export_within, on_removed, paper_for, with_pixels
@@ -30,7 +30,7 @@ from warpsplat.run.second_look import other_subject, retaken
 from warpsplat.run.strategies import STRATEGIES, Strategy, arranged, choose_strategy
 from warpsplat.run.tracking import before_clearing, failed, recorded, report_end, timed
 from warpsplat.run.typed import Options
-from warpsplat.scene import FloatArray
+from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.numbers import hex_colors
 
 if TYPE_CHECKING:
@@ -128,26 +128,11 @@ def make_result(
     begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
     checkpoint = run.checkpoint
     image = with_pixels(image)
-    problem, reduction = image.problem, image.reduction
-    target, settings = problem.target, problem.settings
-    run = timed(recorded(run, history), settings, target)
-    strategy = choose_strategy(settings) if start is None else STRATEGIES["fit"]
-    part = run if strategy.traces else before_clearing(run, target)
+    target, reduction = image.problem.target, image.reduction
+    run = timed(recorded(run, history), image.problem.settings, target)
     with naming(image.name):
-        if start is None:
-            made = _made(problem, strategy, part)
-            while image.why and (other := other_subject(made, problem)):
-                image = retaken(image, other)
-                problem, settings = image.problem, image.problem.settings
-                strategy = choose_strategy(settings)
-                part = run if strategy.traces else before_clearing(run, target)
-                made = _made(problem, strategy, part)
-        else:
-            from warpsplat.fit.loop import fit
-
-            made = fit(problem, part, start)
-        if run.failures and not (made.iterations or strategy.traces):
-            raise run.failures[0]
+        image, strategy, made = _fitted(image, run, start)
+        problem, settings = image.problem, image.problem.settings
         report_end(made, run, history)
         optics = explained(made, problem) if made.is_sharper and not made.interrupted else None
         made = _arranged(made, problem, strategy, run)
@@ -155,28 +140,16 @@ def make_result(
             checkpoint.save()
         if reduction:
             made, settings = reduction.enlarged(made), reduction.settings(settings)
-        release_memory()
-        # A file that was cut short must not pass for a finished one.
-        metadata = STOPPED if made.interrupted else problem.metadata
-        paper = paper_for(image, settings)
-        shown, notes, background = made.scene, image.notes, made.scene.canvas.background
-        is_removed = strategy.traces and (problem.removes_background or bool(settings.bridges))
-        if is_removed:
-            notes += removal_notes(background, settings)
-            shown = replace(shown, canvas=replace(shown.canvas, background=solid_color(settings.background)))
-        svg, scene = export_within(shown, settings, made.per_pixel, metadata, paper)
-        file = paper(svg)
-        if is_removed and background is not None:  # figures are those on it
-            svg = on_removed(svg, scene, settings, made.per_pixel, background)
+        drawn = _drawn(made, image, strategy, settings, optics)
         if write:
-            write(file)
-        score = scored(svg, target, settings, run, reduction, interrupted=made.interrupted)
-        score = score.of_file(file) if score else None
+            write(drawn.file)
+        score = scored(drawn.judged, target, settings, run, reduction, interrupted=made.interrupted)
+        score = score.of_file(drawn.file) if score else None
         render_psnr, render_ssim = render_score(made, target, settings, run, reduction)
         seconds = time.monotonic() - begun
         result = Result(
-            svg=file,
-            scene=scene,
+            svg=drawn.file,
+            scene=drawn.scene,
             score=score,
             render_psnr=render_psnr,
             estimated_psnr=made.estimated_psnr,
@@ -188,16 +161,11 @@ def make_result(
             renderer=settings.renderer,
             render_ssim=render_ssim,
             missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),
-            levels=level_scores(scene, settings, made.per_pixel, target, reduction) if score else (),
+            levels=level_scores(drawn.scene, settings, made.per_pixel, target, reduction) if score else (),
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
-            notes=(
-                *notes,
-                *([optics.words()] if optics else []),
-                *paper.notes(),
-                *bridge_notes(scene, settings, made.per_pixel),
-            ),
+            notes=drawn.notes,
             optics=optics,
             history=tuple(history),
         )
@@ -205,6 +173,65 @@ def make_result(
     if run.failures:
         raise failed(run, image.name, result)
     return result
+
+
+def _fitted(image: PreparedImage, run: Run, start: Start | None) -> tuple[PreparedImage, Strategy, Fit]:
+    """Return what is made of an image; and that image, which may turn out to be another subject's.
+
+    Raises:
+        DeviceError: the device failed before there was anything to save.
+    """
+    target = image.problem.target
+    while True:
+        problem = image.problem
+        strategy = choose_strategy(problem.settings) if start is None else STRATEGIES["fit"]
+        part = run if strategy.traces else before_clearing(run, target)
+        if start is not None:
+            from warpsplat.fit.loop import fit
+
+            made, other = fit(problem, part, start), None
+        else:
+            made = _made(problem, strategy, part)
+            other = other_subject(made, problem) if image.why else None
+        if not other:
+            break
+        image = retaken(image, other)
+    if run.failures and not (made.iterations or strategy.traces):
+        raise run.failures[0]
+    return image, strategy, made
+
+
+class _File(NamedTuple):
+    """A fit as a file."""
+
+    file: str
+    judged: str
+    """Its text that the figures are of: on the background that was removed from it."""
+    scene: Scene
+    notes: tuple[str, ...]
+
+
+def _drawn(
+    made: Fit, image: PreparedImage, strategy: Strategy, settings: Settings, optics: Explained | None
+) -> _File:
+    """Return the file of what was made of an image."""
+    release_memory()
+    paper = paper_for(image, settings)
+    problem, shown, notes = image.problem, made.scene, image.notes
+    background = shown.canvas.background
+    # A file that was cut short must not pass for a finished one.
+    metadata = STOPPED if made.interrupted else problem.metadata
+    is_removed = strategy.traces and (problem.removes_background or bool(settings.bridges))
+    if is_removed:
+        notes += removal_notes(background, settings)
+        shown = replace(shown, canvas=replace(shown.canvas, background=solid_color(settings.background)))
+    svg, scene = export_within(shown, settings, made.per_pixel, metadata, paper)
+    judged = svg
+    if is_removed and background is not None:
+        judged = on_removed(svg, scene, settings, made.per_pixel, background)
+    notes += (optics.words(),) if optics else ()
+    notes += (*paper.notes(), *bridge_notes(scene, settings, made.per_pixel))
+    return _File(paper(svg), judged, scene, notes)
 
 
 def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:

@@ -18,5 +18,5 @@ from warpsplat.scene.attributes import Unit as Unit
 from warpsplat.scene.scene import Canvas as Canvas
 from warpsplat.scene.scene import FloatArray as FloatArray
 from warpsplat.scene.scene import IndexArray as IndexArray
-from warpsplat.scene.scene import Picture as Picture
+from warpsplat.scene.scene import KeptPicture as KeptPicture
 from warpsplat.scene.scene import Scene as Scene

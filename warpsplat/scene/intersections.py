@@ -17,12 +17,6 @@ LEVELS = 3
 CHUNK = 1 << 17
 """Pairs that are looked at together."""
 
-SHIFT = 0.382
-"""By how much of a line the first one of a cubic is longer, and the last one shorter."""
-
-TOUCH = 1e-9
-"""Twice the area of a triangle [units²] below which a point lies on a line: more than rounding errors."""
-
 
 def parts(cubics: Floats, start: Floats, end: Floats) -> Floats:
     """Return the part of each cubic, shape (cubic, 4, 2), between two parameters, shape (cubic,)."""
@@ -42,7 +36,8 @@ def places(pieces: int) -> Floats:
 
     They are no simple fractions: symmetric shapes often cross at these, where neither line would.
     """
-    found = (np.arange(pieces + 1) + SHIFT) / pieces
+    shift = 0.382  # by how much of a line the first one of a cubic is longer, and the last one shorter
+    found = (np.arange(pieces + 1) + shift) / pieces
     found[0], found[-1] = 0, 1
     return found
 
@@ -135,7 +130,9 @@ def _crossing(
     a, b, c, d = lines[one, i], lines[one, i + 1], lines[other, j], lines[other, j + 1]
     sides = [cross(b - a, c - a), cross(b - a, d - a), cross(d - c, a - c), cross(d - c, b - c)]
     found = (sides[0] * sides[1] < 0) & (sides[2] * sides[3] < 0)
-    found &= np.min(np.abs(sides), axis=0, initial=np.inf) > TOUCH
+    # Twice the area of a triangle [units²] below which a point lies on a line: more than rounding errors.
+    touch = 1e-9
+    found &= np.min(np.abs(sides), axis=0, initial=np.inf) > touch
     along = [(x / np.where(found, x - y, 1))[found] for x, y in (sides[2:], sides[:2])]
     t = places(lines.shape[1] - 1)
     own = own[found]

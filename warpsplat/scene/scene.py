@@ -47,7 +47,7 @@ class Canvas:
 
 @described
 @dataclass(frozen=True, eq=False)
-class Picture:
+class KeptPicture:
     """SVG elements that no shape can hold, and their rendering. It equals only itself."""
 
     markup: str
@@ -151,7 +151,7 @@ class Scene:
     """
     picture: IntArray = None  # type: ignore[assignment]
     """Row of ``pictures`` of each shape, or NO_PICTURE, shape (shape,)."""
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[KeptPicture, ...] = ()
     """Pictures between the shapes, which are not optimised."""
     layer_names: tuple[str, ...] = ()
     """Names of the layers by number; empty: they are levels."""

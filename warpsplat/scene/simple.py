@@ -22,9 +22,6 @@ from warpsplat.scene.scene import FloatArray, IndexArray, Scene, ranges, starts_
 
 Floats = npt.NDArray[np.float64]
 
-ROUNDS = 8
-"""Times that a shape is made simple and rounded: rounding may make contours cross again, by a hair."""
-
 LEAST = 0.1
 """Area [px²] of rings that are left out: nobody sees them."""
 
@@ -33,9 +30,6 @@ PIECES, SAMPLES = 8, 9
 
 GROWN = 0.02
 """By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
-
-UNEVEN = 0.01
-"""By how much the thirds of a line may differ [units]: more than single precision does."""
 
 Painted = Callable[[IndexArray], npt.NDArray[np.bool_]]
 """Whether there is paint, by how often contours wind around a place."""
@@ -117,7 +111,9 @@ def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Fl
         painted: Where there is paint.
         least: Area [units²].
     """
-    for _ in range(ROUNDS):
+    # Times that a shape is made simple and rounded: rounding may make contours cross again, by a hair.
+    rounds = 8
+    for _ in range(rounds):
         kept, new = uncrossed(_cut_at_nodes(rings))
         seen = large(kept, least)
         if not new and len(seen) == len(rings):
@@ -280,7 +276,8 @@ def _held(cubic: Floats, row: int, end: Floats) -> Floats:
 def _are_lines(cubics: Floats) -> npt.NDArray[np.bool_]:
     """Return which cubics have their handles at the thirds of a line."""
     steps = np.diff(cubics[..., :2], axis=1)
-    return np.asarray(np.abs(steps - steps[:, 1:2]).max(axis=(1, 2)) <= UNEVEN)
+    uneven = 0.01  # by how much the thirds of a line may differ [units]: more than single precision does
+    return np.asarray(np.abs(steps - steps[:, 1:2]).max(axis=(1, 2)) <= uneven)
 
 
 def reversed_ring(ring: Floats) -> Floats:

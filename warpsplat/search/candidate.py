@@ -41,12 +41,6 @@ FEW_COARSE_PIXELS, FEW_FINE_PIXELS = 6_000, 24_000
 FEW_POINTS, FEW_MEAN_POINTS = 8, 6.0
 """Points of a new fill, and their mean in the end: another shape is worth more than a finer outline."""
 
-FEW_OPACITY = 0.7
-"""Opacity of all shapes, written once for all: where they overlap there are more colours than shapes."""
-
-LEAST_BACKGROUND_SHARE = 1e-3
-"""Least share of the canvas through which the background shows for its colour to be fitted."""
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -146,11 +140,13 @@ def for_few(settings: Settings) -> Settings:
     )
     if settings.kind == Kind.STROKE or settings.basis != Basis.SPLINE or settings.opaque:
         return settings
+    # Opacity of all shapes, written once for all: where they overlap there are more colours than shapes.
+    few_opacity = 0.7
     return replace(
         settings,
         spline_points=min(settings.spline_points, FEW_POINTS),
         density=replace(settings.density, mean_points=min(settings.density.mean_points, FEW_MEAN_POINTS)),
-        opacity=FEW_OPACITY,
+        opacity=few_opacity,
         rates={**settings.rates, "opacities": 0.0},
     )
 
@@ -166,7 +162,9 @@ def fit_background(scene: Scene, image: FloatArray, backend: Backend) -> Scene:
     )
     seen = (white - black).astype(np.float64)
     weight = (seen * seen).sum(axis=(0, 1))
-    if weight.min() < LEAST_BACKGROUND_SHARE * image.shape[0] * image.shape[1]:
+    # Least share of the canvas through which the background shows for its colour to be fitted.
+    least_background_share = 1e-3
+    if weight.min() < least_background_share * image.shape[0] * image.shape[1]:
         return scene
     color = np.clip((seen * (image - black)).sum(axis=(0, 1)) / weight, 0, 1)
     background = (np.round(color * 255) / 255).astype(np.float32)

@@ -21,42 +21,17 @@ from warpsplat.rendering.failures import failures_of
 from warpsplat.search.candidate import FEW_SHAPES, LAST_STEPS, Candidate, Change, changed, for_few, measured
 from warpsplat.svg.write import GRIDS
 
-MOST_CURVES = 20_000
-"""Most shapes without ``--curves``."""
-
 PROBES, PROBE_CURVES, PROBE_STEP = 4, 256, 8.0
 """Most probe runs, shapes of the first one, and largest factor between the numbers of two."""
 
-PROBE_RANGE = 2.0
-"""Factor of the number of shapes over which the estimate of a probe run holds."""
-
-PROBE_GAIN = 1.5
-"""Least gain of 1,000 steps over a probe run with as many shapes [dB]. It errs towards too many shapes, since
-removing some at the end costs little."""
-
 PROBE_TIME, FIRST_TIME = 0.15, 0.7
 """Shares of a time budget: for all probe runs, and of the rest for the first fit."""
-
-FIRST_FITS = 3
-"""First fits of a file of few shapes, with different seeds: by chance they differ by tenths of a decibel."""
-
-SEARCH_ROUNDS = 6
-"""Most times that shapes are removed or added."""
 
 LIKELY_PROBES, LIKELY_ROUNDS = 2, 3
 """Probe runs and rounds that a search takes on average, for its progress."""
 
 ENOUGH_DB, AIM_DB = 0.03, 0.01
 """A file this little above the target is small enough, and a new candidate aims so far above it [dB]."""
-
-CUT_DB = 1.3
-"""Loss by halving the number of shapes, at the rate of the first to be removed, the others refitted [dB]."""
-
-NEAR_SIZE = 0.005
-"""Least relative difference in size to a smaller file that missed the target for a candidate in between."""
-
-LEAST_LACK = 0.05
-"""A file that misses the target gets shapes for at least so much [dB]."""
 
 FULL_SHARE, AIM_FULL = 0.98, 0.996
 """Shares of the size limit from which a file is large enough, and that a new candidate aims at."""
@@ -87,7 +62,8 @@ def search_goal(problem: Problem, run: Run) -> Fit:
     if first.interrupted:
         return replace(first, iterations=done)
     tried, parts = [measured(problem, first)], run.open_parts(fitted, 1 / LIKELY_ROUNDS)
-    for _ in range(SEARCH_ROUNDS):
+    search_rounds = 6  # most times that shapes are removed or added
+    for _ in range(search_rounds):
         change = next_change(tried, settings)
         if change is None or run.over():
             break
@@ -118,8 +94,9 @@ def _progress(settings: Settings) -> tuple[float, float]:
 def _for_search(problem: Problem) -> Problem:
     """Return the problem with the most shapes that there may be, and settings for few shapes if need be."""
     settings, most = problem.settings, problem.settings.curves
+    most_curves = 20_000  # most shapes without --curves
     if settings.simplify:
-        most = min(MOST_CURVES, simple_curves(problem.target))
+        most = min(most_curves, simple_curves(problem.target))
     settings = replace(settings, curves=most)
     if settings.max_bytes:
         fitting = affordable_curves(settings, *problem.size)
@@ -133,17 +110,21 @@ def estimate_curves(problem: Problem, most: int, run: Run) -> tuple[int, int, Fi
     assert settings.target_psnr
     draft = draft_of(settings)
     longer = elementary.log(settings.iterations / draft.iterations) / elementary.log(5)
-    aim = settings.target_psnr - PROBE_GAIN * float(longer)
+    # Least gain of 1,000 steps over a probe run with as many shapes [dB]. It errs towards too many shapes,
+    # since removing some at the end costs little.
+    probe_gain = 1.5
+    aim = settings.target_psnr - probe_gain * float(longer)
     curves, done = min(PROBE_CURVES, most), 0
     seen: dict[int, float] = {}
     parts = run.open_parts()
+    probe_range = 2.0  # factor of the number of shapes over which the estimate of a probe run holds
     for _ in range(PROBES):
         probe = replace(problem, settings=replace(draft, curves=curves))
         made = fit(probe, next(parts).within(PROBE_TIME / PROBES), None, BY_BYTES)
         done += made.iterations
         seen[curves] = measured(problem, made).psnr
         used, curves = curves, curves_for(aim, seen, most)
-        if made.interrupted or max(used / curves, curves / used) <= PROBE_RANGE or curves in seen:
+        if made.interrupted or max(used / curves, curves / used) <= probe_range or curves in seen:
             break
     return curves, done, made
 
@@ -172,7 +153,9 @@ def curves_for(aim: float, seen: dict[int, float], most: int) -> int:
 def fit_first(problem: Problem, run: Run) -> tuple[Fit, int]:
     """Fit ``settings.curves`` shapes, several times if these are few; return the best, and all steps."""
     settings = problem.settings
-    tries = FIRST_FITS if settings.max_bytes and settings.curves <= FEW_SHAPES else 1
+    # First fits of a file of few shapes, with different seeds: by chance they differ by tenths of a decibel.
+    first_fits = 3
+    tries = first_fits if settings.max_bytes and settings.curves <= FEW_SHAPES else 1
     results: list[Fit] = []
     for number in range(tries):
         seeded = problem.having(seed=(settings.seed + number) % 2**32, target_psnr=None)
@@ -231,13 +214,17 @@ def _cut(best: Candidate, tried: list[Candidate], settings: Settings) -> Change 
     """Return how to make a candidate smaller that reaches the target."""
     assert settings.target_psnr
     surplus = best.psnr - settings.target_psnr
-    slope, least = CUT_DB, CUT_MOST * best.size
+    # Loss by halving the number of shapes, at the rate of the first to be removed, the others refitted [dB].
+    cut_db = 1.3
+    slope, least = cut_db, CUT_MOST * best.size
     failed = [later for later in tried[tried.index(best) + 1 :] if later.size < best.size]
     if failed:
         nearest = max(failed, key=lambda candidate: candidate.size)
         slope = (best.psnr - nearest.psnr) / float(elementary.log2(best.size / nearest.size))
         least = (2 * nearest.size + best.size) / 3
-    if surplus <= ENOUGH_DB or best.size - least < NEAR_SIZE * best.size:
+    # Least relative difference in size to a smaller file that missed the target for a candidate in between.
+    near_size = 0.005
+    if surplus <= ENOUGH_DB or best.size - least < near_size * best.size:
         return None
     wanted = best.size * float(elementary.power(2, (AIM_DB - surplus) / slope))
     return Change(best, max(wanted, least), best.fit.per_pixel)
@@ -250,8 +237,9 @@ def _growth(base: Candidate, settings: Settings) -> Change | None:
         finer = [grid for grid in (*GRIDS, finest(settings)) if 2 * per_pixel <= grid <= finest(settings)]
         return Change(base, base.size, min(finer)) if finer else None
     wanted = GROW_MOST * base.size
+    least_lack = 0.05  # A file that misses the target gets shapes for at least so much [dB]
     if settings.target_psnr:
-        lack = max(settings.target_psnr - base.psnr, LEAST_LACK)
+        lack = max(settings.target_psnr - base.psnr, least_lack)
         wanted = min(wanted, base.size * float(elementary.power(2, lack / DB_PER_DOUBLING)))
     wanted = min(wanted, AIM_FULL * (settings.max_bytes or math.inf))
     return Change(base, wanted, per_pixel if wanted <= SAME_GRID * base.size else None)

@@ -22,11 +22,6 @@ BEGIN = 0.25, 0.375
 schedule has as many shapes as it starts with (docs/experiments.md).
 """
 
-LEAST_GROWTH_STEPS = 5
-"""Fewest densification steps in which the shapes of a continued fit grow: many at a time find bad places.
-Fits of few steps have fewer, and start with new shapes.
-"""
-
 
 class Series:
     """Fits of ascending numbers of shapes, one after the other."""
@@ -75,7 +70,10 @@ def begin_of(settings: Settings, shapes: int) -> int:
     missing_log = float(elementary.log(density.surplus * settings.curves / shapes))
     missing = missing_log / growth if growth > 0 else 0.0
     share = min(max(density.grown * (1 - missing), BEGIN[0]), BEGIN[1])
-    latest = max(density.grown * steps - LEAST_GROWTH_STEPS * density.interval, 0)
+    # Fewest densification steps in which the shapes of a continued fit grow: many at a time find bad places.
+    # Fits of few steps have fewer, and start with new shapes.
+    least_growth_steps = 5
+    latest = max(density.grown * steps - least_growth_steps * density.interval, 0)
     return round(min(share * steps, latest)) // density.interval * density.interval
 
 

@@ -17,18 +17,6 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-LARGEST_BULGE = 0.5
-"""The bulge of an arc of 106 degrees; a longer one may run round the wrong side of its curve."""
-
-KINK = 1e-3
-"""Largest difference of bulges at both ends of a curve that one arc replaces: 0.2 degrees."""
-
-STRAIGHT = 1e-3
-"""Largest distance from a line, over the tolerance, at which a curve is one."""
-
-MOST_HALVINGS = 20
-"""A curve that was halved so often is a millionth as long, and becomes a line, whatever it is."""
-
 SAMPLES = np.arange(1, 8) / 8
 """Where distances are measured, in the parameter of a curve."""
 
@@ -61,9 +49,12 @@ def as_arcs(curves: Floats, tolerance: float) -> Vertices:
     start = curves[0, 0]
     places = np.arange(len(curves), dtype=np.float64)  # of the ends of arcs, in order along the chain
     size, found = 1.0, []
-    for halving in range(MOST_HALVINGS + 1):
+    straight = 1e-3  # largest distance from a line, over the tolerance, at which a curve is one
+    # A curve that was halved so often is a millionth as long, and becomes a line, whatever it is.
+    most_halvings = 20
+    for halving in range(most_halvings + 1):
         made = _biarcs(curves, tolerance)
-        is_line = _sagging(curves) <= (STRAIGHT * tolerance if halving < MOST_HALVINGS else np.inf)
+        is_line = _sagging(curves) <= (straight * tolerance if halving < most_halvings else np.inf)
         single, double = is_line | made.is_one, made.is_close & ~is_line & ~made.is_one
         found += [
             (places[single] + size, curves[single, 3], np.where(is_line, 0.0, made.whole)[single]),
@@ -136,6 +127,9 @@ def _biarcs(curves: Floats, tolerance: float) -> _Biarcs:
     first, last = _tangents(curves), -_tangents(curves[:, ::-1])
     both = _dot(chord, first + last)
     square = _dot(chord, chord)
+    kink = 1e-3  # largest difference of bulges at both ends of a curve that one arc replaces: 0.2 degrees
+    # The bulge of an arc of 106 degrees; a longer one may run round the wrong side of its curve.
+    largest_bulge = 0.5
     with np.errstate(all="ignore"):
         reach = square / (both + np.sqrt(both * both + 2 * (1 - _dot(first, last)) * square))
         joint = (start + end + reach[:, None] * (first - last)) / 2
@@ -145,11 +139,11 @@ def _biarcs(curves: Floats, tolerance: float) -> _Biarcs:
         samples = points_at(curves, SAMPLES)
         is_first = ((samples - joint[:, None]) * across[:, None]).sum(axis=2) < 0
         offs = (_offs(samples, start, halves[0], bulges[0]), _offs(samples, joint, halves[1], bulges[1]))
-        is_short = (np.abs(bulges[0]) <= LARGEST_BULGE) & (np.abs(bulges[1]) <= LARGEST_BULGE) & (reach > 0)
+        is_short = (np.abs(bulges[0]) <= largest_bulge) & (np.abs(bulges[1]) <= largest_bulge) & (reach > 0)
         is_close = is_short & (np.abs(np.where(is_first, *offs)).max(axis=1) <= tolerance)
         ends = _bulge(first, chord), _bulge(chord, last)
         whole = (bulges[0] + bulges[1]) / (1 - bulges[0] * bulges[1])
-        is_one = is_short & (np.abs(ends[0] - ends[1]) <= KINK) & (np.abs(whole) <= LARGEST_BULGE)
+        is_one = is_short & (np.abs(ends[0] - ends[1]) <= kink) & (np.abs(whole) <= largest_bulge)
         is_one &= np.abs(_offs(samples, start, chord, whole)).max(axis=1) <= tolerance
     return _Biarcs(joint, *bulges, whole, is_close, is_one)
 

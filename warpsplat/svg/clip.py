@@ -24,12 +24,6 @@ Bools = npt.NDArray[np.bool_]
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""
 
-NEAR_END = 1e-9
-"""Cubics are not cut closer to their ends than this, in their parameter."""
-
-OVERLAP_SHAPES = 2000
-"""Most shapes of a group that are compared with each other."""
-
 EDGE = 1e-3
 """Overlap [px] of boxes that still counts as touching."""
 
@@ -38,7 +32,8 @@ def overlap(shapes: list[Shape]) -> bool:
     """Return whether the boxes of shapes overlap."""
     if len(shapes) < 2:
         return False
-    if len(shapes) > OVERLAP_SHAPES:
+    overlap_shapes = 2000  # most shapes of a group that are compared with each other
+    if len(shapes) > overlap_shapes:
         return True
     boxes = np.stack([shape.box() for shape in shapes])
     low, high = boxes[:, 0] + EDGE, boxes[:, 1] - EDGE
@@ -150,9 +145,10 @@ def _zeros(a: float, b: float, c: float, d: float) -> list[float]:
     root = v + math.copysign(math.sqrt(max(v * v - u * w, 0.0)), v)
     extrema = [top / bottom for top, bottom in ((-root, u), (w, -root)) if abs(top) < abs(bottom)]
     # Where an extremum is 0, the curve touches the line or crosses it with a slope of 0.
-    extrema = sorted(t for t in extrema if NEAR_END < t < 1 - NEAR_END and height(t) != 0)
+    near_end = 1e-9  # cubics are not cut closer to their ends than this, in their parameter
+    extrema = sorted(t for t in extrema if near_end < t < 1 - near_end and height(t) != 0)
     found = []
-    for low, high in pairwise([NEAR_END, *extrema, 1 - NEAR_END]):
+    for low, high in pairwise([near_end, *extrema, 1 - near_end]):
         if (height(low) > 0) == (height(high) > 0):
             continue
         start, end = (low, high) if height(high) > 0 else (high, low)

@@ -129,10 +129,6 @@ def _shortest(pen: Pair | None, start: Pair, commands: Iterable[Sequence[_Comman
     return min(_text(written) for written in best if written[0] == least)
 
 
-STARTS = 4
-"""Most promising starts of a ring that are tried."""
-
-
 def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]:
     """Return path data of a ring, from its best start, and that start, where the pen is then.
 
@@ -147,7 +143,8 @@ def shortest_ring(pen: Pair | None, segments: list[Segment]) -> tuple[str, Pair]
             spared = 1 + min(len(repeated) for _, repeated, _ in commands[i - 1])
         promise.append((len(row(segment.start, False)) - spared, segment.start, i))
     found = []
-    for _, start, i in sorted(promise)[:STARTS]:
+    starts = 4  # most promising starts of a ring that are tried
+    for _, start, i in sorted(promise)[:starts]:
         # No handle is mirrored behind the move.
         is_same = segments[i].handles is None or behind[i].mirrored() == start
         first = commands[i] if is_same else _commands(segments[i], start)

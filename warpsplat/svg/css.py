@@ -213,15 +213,6 @@ class _Rule(NamedTuple):
 
 ANIMATED = "uses animation, not supported: take the still SVG of the same picture"
 
-MAX_WORK = 5_000_000
-"""Most tests of elements to find the rules that apply to them: with plain selectors, rules times elements."""
-
-DECLARATION_WORK = 10
-"""Tests of an element that take as long as applying a rule."""
-
-CHARACTERS = 100
-"""Characters of an attribute that take as long to test as an element."""
-
 
 class StyleSheet:
     """The rules of an SVG's ``style`` elements."""
@@ -264,10 +255,15 @@ class StyleSheet:
         asked = [rule for key in keys for rule in self._rules.get(key, ())]
         is_nested = any(len(rule.compounds) > 1 for rule in asked)
         depth = len(ancestors(element, parents)) if is_nested else 0
-        text = sum(map(len, element.attrib.values())) // CHARACTERS
+        characters = 100  # characters of an attribute that take as long to test as an element
+        text = sum(map(len, element.attrib.values())) // characters
         self._work += sum(1 + text * one.reads_attributes + depth * (len(one.compounds) - 1) for one in asked)
-        if self._work > MAX_WORK:
+        # Most tests of elements to find the rules that apply to them: with plain selectors, rules times
+        # elements.
+        max_work = 5_000_000
+        if self._work > max_work:
             raise ImageError("has too many style rules for its number of elements")
         matching = [rule for rule in asked if rule.matches(element, parents)]
-        self._work += DECLARATION_WORK * len(matching)
+        declaration_work = 10  # tests of an element that take as long as applying a rule
+        self._work += declaration_work * len(matching)
         return [d for rule in sorted(matching, key=lambda rule: rule.order) for d in rule.declarations]

@@ -33,9 +33,6 @@ def integers(pairs: Iterable[Pair]) -> str:
 
 Floats = npt.NDArray[np.float64]
 
-NEAR_THIRD = 0.05
-"""Largest distance of a line's handles from its thirds, in units of the view box ..."""
-
 THIRD = 0.5 + 1e-9
 """... and the same for rounded points: as far as rounding moves handles, which moves the outline by less."""
 
@@ -48,7 +45,8 @@ def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
     """
     found = np.zeros(len(exact), np.bool_)
     rows = cubic_rows(scene)
-    for corners, near in ((exact[rows], NEAR_THIRD), (np.round(exact[rows]), THIRD)):
+    near_third = 0.05  # largest distance of a line's handles from its thirds, in units of the view box ..
+    for corners, near in ((exact[rows], near_third), (np.round(exact[rows]), THIRD)):
         vectors = corners[:, 1:] - corners[:, :1]
         chord = vectors[:, 2:]
         handles, thirds = vectors[:, :2], np.array([[1 / 3], [2 / 3]]) * chord

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 CURVES = ("arcs", "splines", "lines", "r12")
 """How curves are written: as arcs of polylines, as exact splines, as lines, as lines in the old version."""
 
-MILLIMETRES = 25.4
-"""Millimetres in an inch."""
-
 TOLERANCE = 1 / 20_000
 """Largest distance of arcs and lines from curves, over the page's longer side."""
 
@@ -34,16 +31,11 @@ ROUND = 2.8e-4
 DECIMALS = 6
 """Decimals of coordinates [mm]."""
 
-BULGE_DECIMALS = 9
-
 NOTHING = 1e-6
 """Length of curves that are left out [mm]."""
 
 VERSION, OLD_VERSION = "R2004", "R12"
 """Versions of the format: the first that has colours of 24 bits, and one that all programs read."""
-
-FOREGROUND = 7
-"""The index of the colour that programs show in black on white."""
 
 
 def draw_dxf(text: str, curves: str, *, zoom: float = 1.0) -> bytes:
@@ -75,7 +67,8 @@ def _document(text: str, curves: str, zoom: float) -> Drawing:
     from ezdxf import units
     from ezdxf.document import Drawing
 
-    page = drawn_on_page(text, MILLIMETRES * zoom, background=False)
+    millimetres = 25.4  # millimetres in an inch
+    page = drawn_on_page(text, millimetres * zoom, background=False)
     document = Drawing.new(OLD_VERSION if curves == "r12" else VERSION)
     if curves != "r12":  # which has no units
         document.units = units.MM
@@ -142,7 +135,8 @@ def _draw(
         _draw_spline(space, chain, closed, attributes)
         return
     made = as_arcs(chain, tolerance) if curves == "arcs" else straight
-    points, bulges = _rounded(made.points), [*np.round(made.bulges, BULGE_DECIMALS).tolist(), 0.0]
+    bulge_decimals = 9
+    points, bulges = _rounded(made.points), [*np.round(made.bulges, bulge_decimals).tolist(), 0.0]
     if closed:
         points, bulges = points[:-1], bulges[:-1]
     vertices = [(x, y, bulge) for (x, y), bulge in zip(points, bulges, strict=True)]
@@ -184,10 +178,11 @@ def _nearest_index(rgb: int) -> int:
     """Return the index of the colour next to ``rgb``, 0xRRGGBB, in AutoCAD's palette."""
     from ezdxf.colors import DXF_DEFAULT_COLORS
 
+    foreground = 7  # the index of the colour that programs show in black on white
     if rgb == 0:
-        return FOREGROUND
+        return foreground
 
     def distance(index: int) -> int:
         return sum(((DXF_DEFAULT_COLORS[index] >> i & 255) - (rgb >> i & 255)) ** 2 for i in (0, 8, 16))
 
-    return min((index for index in range(1, 256) if index != FOREGROUND), key=distance)
+    return min((index for index in range(1, 256) if index != foreground), key=distance)

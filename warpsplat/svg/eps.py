@@ -18,9 +18,6 @@ from warpsplat.svg.shapes import LineStyle, Shape
 POINTS = 72.0
 """Points in an inch."""
 
-DECIMALS = 3
-"""Decimals of coordinates [pt]."""
-
 CAPS = {Cap.BUTT: 0, Cap.ROUND: 1, Cap.SQUARE: 2}
 JOINS = {Join.MITER: 0, Join.ROUND: 1, Join.BEVEL: 2}
 
@@ -52,7 +49,8 @@ def draw_eps(text: str, *, zoom: float = 1.0) -> bytes:
 
 def row(values: list[float]) -> str:
     """Return numbers in as few characters as possible."""
-    return " ".join(number(value, DECIMALS) for value in values)
+    decimals = 3  # decimals of coordinates [pt]
+    return " ".join(number(value, decimals) for value in values)
 
 
 def _painted(shape: Shape) -> list[str]:

@@ -10,9 +10,6 @@ from warpsplat.forms import form_of
 from warpsplat.scene import Basis, IndexArray, Scene
 from warpsplat.svg.paths import Points
 
-NEAR = 0.01
-"""Largest distance of a form's control points from those of the element that it is read from [px]."""
-
 
 def held_values(scene: Scene, exact: Points) -> Iterator[tuple[IndexArray, Points]]:
     """Yield the rows of forms' values, shape (shape, value), and the values that their elements have.
@@ -56,6 +53,8 @@ def read_form(tag: str, points: Points, closed: bool) -> tuple[Basis, Points] | 
 
     ``points``: control points of its outline, of a ring without the repeated end.
     """
+    # Largest distance of a form's control points from those of the element that it is read from [px].
+    near = 0.01
     for basis in Basis:
         if not basis.is_form or tag not in form_of(basis.name).TAGS:
             continue
@@ -65,6 +64,6 @@ def read_form(tag: str, points: Points, closed: bool) -> tuple[Basis, Points] | 
             return None
         values = form.read(points, closed)
         return (
-            (basis, values) if np.allclose(form.outline(values[None], closed)[0], points, 0, NEAR) else None
+            (basis, values) if np.allclose(form.outline(values[None], closed)[0], points, 0, near) else None
         )
     return None

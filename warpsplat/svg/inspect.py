@@ -63,20 +63,18 @@ def svg_text(data: bytes, name: str) -> str:
 
 DECLARED = re.compile(r"""(\s*<\?xml\b[^>]{0,200}?\sencoding\s*=\s*)["']([\w.:-]{1,40})["']""")
 
-DECLARATION_END = 400
-"""Characters at the start in which an XML declaration must stand."""
-
 ENCODINGS = ("utf-8", "ascii", "iso8859", "cp", "koi8", "mac", "shift_jis", "euc", "gb", "big5")
 """Prefixes of the encodings with units of one byte; Python knows others, which no viewer reads."""
 
 
 def _decode(data: bytes) -> str:
+    declaration_end = 400  # characters at the start in which an XML declaration must stand
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = data.decode("utf-16")
     elif data[:2] in {b"<\0", b"\0<"}:
         text = data.decode("utf-16-le" if data[1] == 0 else "utf-16-be")
     else:
-        declared = DECLARED.match(data[:DECLARATION_END].decode("latin-1"))
+        declared = DECLARED.match(data[:declaration_end].decode("latin-1"))
         encoding = codecs.lookup(declared[2]).name if declared else "utf-8"
         if data.startswith(codecs.BOM_UTF8):
             encoding = "utf-8-sig"
@@ -84,7 +82,7 @@ def _decode(data: bytes) -> str:
             raise LookupError(encoding)
         text = data.decode(encoding)
     # At the start only: a search of the whole text for leading spaces is quadratic.
-    return DECLARED.sub(r'\1"UTF-8"', text[:DECLARATION_END], count=1) + text[DECLARATION_END:]
+    return DECLARED.sub(r'\1"UTF-8"', text[:declaration_end], count=1) + text[declaration_end:]
 
 
 @dataclass(frozen=True)

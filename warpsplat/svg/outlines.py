@@ -17,9 +17,6 @@ from warpsplat.svg.shapes import Shape, opacity_of
 from warpsplat.svg.structure import read_shapes
 from warpsplat.svg.values import Color
 
-PER_INCH = 96.0
-"""Pixels of an inch (CSS)."""
-
 
 @dataclass(frozen=True)
 class Drawn:
@@ -58,7 +55,8 @@ def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Draw
     page = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float64)
     with np.errstate(all="ignore"):  # boxes of straight lines
         parts = [[shape] if shape.line else clipped([shape], page) for shape in shapes]
-    scale = units_per_inch / PER_INCH
+    per_inch = 96.0  # pixels of an inch (CSS)
+    scale = units_per_inch / per_inch
     upwards, shift = np.diag([scale, -scale]), np.array([0, scale * height])
     moved = []
     for shape in itertools.chain.from_iterable(parts):

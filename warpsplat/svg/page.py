@@ -27,9 +27,6 @@ PAGES = {"a3": (297.0, 420.0), "a4": (210.0, 297.0), "a5": (148.0, 210.0), "lett
 MARGIN = 10.0
 """Margin of a page on each side [mm]."""
 
-LARGEST = 10_000.0
-"""Longest side of a sheet [mm]."""
-
 STRETCHED = 'preserveAspectRatio="none"'
 """Attribute of a picture whose pixels are no squares."""
 
@@ -49,9 +46,6 @@ SIZE = re.compile(
     r"(?=.*\d)(\d+(?:\.\d+)?)?\s*(?:[x×]\s*(\d+(?:\.\d+)?))?\s*(mm|cm|in|pt|px)?", re.IGNORECASE
 )
 """A width, a height after an x, or both; and a unit."""
-
-DECIMALS = 3
-"""Decimals of boxes."""
 
 DIGITS, MOST_DECIMALS = 6, 12
 """Significant digits of sizes, and how many of them may be decimals."""
@@ -106,8 +100,9 @@ def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet
         raise UsageError(f"not a size: {shown(size)}; write 200x150mm, or one side: 200mm or x150mm")
     factor = MILLIMETRES[(found[3] or unit).lower()]
     across, down = (float(side) * factor if side else None for side in found.groups()[:2])
-    if not all(0 < side <= LARGEST for side in (across, down) if side is not None):
-        raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {LARGEST:g} mm")
+    largest = 10_000.0  # longest side of a sheet [mm]
+    if not all(0 < side <= largest for side in (across, down) if side is not None):
+        raise UsageError(f"size {cut(size)} leaves no room, or has a side beyond {largest:g} mm")
     if across is None:
         assert down
         return Sheet(down * width / height, down, unit=unit)
@@ -173,12 +168,9 @@ def _attributes(sheet: Sheet) -> str:
 
 def _with_head(text: str, size: str, view: Iterable[float]) -> str:
     """Return the file with other attributes for its size and another view box."""
-    box = " ".join(number(value, DECIMALS) for value in view)
+    decimals = 3  # decimals of boxes
+    box = " ".join(number(value, decimals) for value in view)
     return f'<svg xmlns="{NAMESPACE}" {size} viewBox="{box}">{text[own_head(text).end() :]}'
-
-
-PROPORTIONS = 0.02
-"""Largest relative difference between the proportions of a picture on a sheet and those of an image."""
 
 
 def picture_view(svg: str, width: int, height: int) -> str | None:
@@ -196,7 +188,9 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
     low = max(space - 1 / side for space, side in spaces)
     high = min(space + 1 / side for space, side in spaces)
     middle = (low + high) / 2
-    if low > (1 + PROPORTIONS) * high or middle <= 0:
+    # Largest relative difference between the proportions of a picture on a sheet and those of an image.
+    proportions = 0.02
+    if low > (1 + proportions) * high or middle <= 0:
         return None
     known = [grid for grid in GRIDS if low <= grid <= high]
     units = min(known, key=lambda grid: abs(grid - middle)) if known else middle

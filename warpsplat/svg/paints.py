@@ -14,9 +14,6 @@ from warpsplat.svg.numbers import hex_colors, number
 
 Floats = npt.NDArray[np.float64]
 
-PLACE_DECIMALS = 2
-"""Decimals of positions where units of the view box are coarser than pixels, or the gradient repeats."""
-
 SHARE_DECIMALS = 3
 """Decimals of offsets and of positions in a gradient's unit space: a thousandth of its extent."""
 
@@ -53,7 +50,9 @@ def _gradient(scene: Scene, shape: int, frame: Floats, per_pixel: float) -> str:
     """Return a shape's gradient element, without its identifier."""
     origin, axes = frame[0], frame[1:]
     # Ramps lie on whole units, as outlines do.
-    decimals = 0 if per_pixel >= 1 and scene.spread[shape] == Spread.PAD else PLACE_DECIMALS
+    # Decimals of positions where units of the view box are coarser than pixels, or the gradient repeats.
+    place_decimals = 2
+    decimals = 0 if per_pixel >= 1 and scene.spread[shape] == Spread.PAD else place_decimals
     if scene.paint[shape] == Paint.LINEAR:
         tag, place = "linearGradient", _line(origin, axes, decimals)
     else:

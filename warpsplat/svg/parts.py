@@ -13,9 +13,6 @@ from warpsplat.scene.scene import ranges, starts_of
 MOST_NODES = 32_000
 """Most nodes of a path."""
 
-MARGIN = 1.0
-"""Contours closer to each other than this [px] stay in one path: the edges of both share pixels."""
-
 
 def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
     """Return ``scene`` with shapes of more than ``most`` nodes as several that look the same.
@@ -35,9 +32,11 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
     parts: list[list[IndexArray]] = [[np.arange(low, high)] for low, high in itertools.pairwise(contours)]
     ends = [extreme.reduceat(scene.points, scene.starts[:-1], axis=0) for extreme in (np.minimum, np.maximum)]
     boxes = np.concatenate(ends, axis=1)
+    # Contours closer to each other than this [px] stay in one path: the edges of both share pixels.
+    margin = 1.0
     for shape in np.flatnonzero(large).tolist():
         own = parts[shape][0]
-        pad = 0.5 * (MARGIN + float(scene.widths[shape]))
+        pad = 0.5 * (margin + float(scene.widths[shape]))
         parts[shape] = [own[part] for part in _packed(_clusters(boxes[own], pad), nodes[own], most)]
     return with_parts(scene, parts)
 

@@ -14,9 +14,6 @@ from warpsplat.svg.inspect import ARGUMENTS, COMMAND, numbers
 
 Points = npt.NDArray[np.float64]
 
-CLOSES = 1e-3
-"""Largest distance [px] of a closed spline's start from the middle of its control points."""
-
 
 class Subpath(NamedTuple):
     """A part of a path that is drawn without lifting the pen."""
@@ -48,7 +45,9 @@ class Subpath(NamedTuple):
         if not self.is_spline or len(controls) < 3:
             return None
         seam = (controls[0] + controls[-1]) / 2
-        return controls if np.allclose(self.points[[0, -1]], seam, rtol=0, atol=CLOSES) else None
+        # Largest distance [px] of a closed spline's start from the middle of its control points.
+        closes = 1e-3
+        return controls if np.allclose(self.points[[0, -1]], seam, rtol=0, atol=closes) else None
 
 
 def cubics(data: str, *, keep_dots: bool) -> list[Subpath]:

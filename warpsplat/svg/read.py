@@ -23,9 +23,9 @@ from warpsplat.scene import (
     Cap,
     FloatArray,
     Join,
+    KeptPicture,
     Kind,
     Paint,
-    Picture,
     Rule,
     Scene,
     Spread,
@@ -162,19 +162,17 @@ def _layers(names: list[str]) -> IntArray:
     return np.concatenate([[0], np.cumsum(changes)]).astype(np.int32)
 
 
-MAX_STOPS = 1_000_000
-"""Most stops of all shapes together; each shape has its own copy of a shared gradient."""
-
-
 def _paints(shapes: list[Shape]) -> dict[str, Any]:
     """Return the fields of a scene that are about colours, gradients and pictures."""
     paints = [shape.paint for shape in shapes]
     ramps = [paint if isinstance(paint, Gradient) else None for paint in paints]
-    if sum(len(ramp.stops) for ramp in ramps if ramp) > MAX_STOPS:
-        raise ImageError(f"its gradients add up to more than {MAX_STOPS} stops")
+    # Most stops of all shapes together; each shape has its own copy of a shared gradient.
+    max_stops = 1_000_000
+    if sum(len(ramp.stops) for ramp in ramps if ramp) > max_stops:
+        raise ImageError(f"its gradients add up to more than {max_stops} stops")
     stops = list(chain.from_iterable(ramp.stops for ramp in ramps if ramp))
     kinds = [Paint.FLAT if r is None else Paint.RADIAL if r.is_radial else Paint.LINEAR for r in ramps]
-    is_picture = np.array([isinstance(paint, Picture) for paint in paints], np.bool_)
+    is_picture = np.array([isinstance(paint, KeptPicture) for paint in paints], np.bool_)
     flat = [paint.color if isinstance(paint, FlatColor) else (0.0, 0.0, 0.0) for paint in paints]
     return {
         "colors": np.array(flat, np.float32).reshape(-1, 3),
@@ -189,21 +187,15 @@ def _paints(shapes: list[Shape]) -> dict[str, Any]:
         "stop_colors": np.array([stop.color for stop in stops], np.float32).reshape(-1, 3),
         "stop_opacities": np.array([stop.opacity for stop in stops], np.float32),
         "picture": np.where(is_picture, np.cumsum(is_picture) - 1, NO_PICTURE).astype(np.int32),
-        "pictures": tuple(paint for paint in paints if isinstance(paint, Picture)),
+        "pictures": tuple(paint for paint in paints if isinstance(paint, KeptPicture)),
     }
 
-
-MAX_PICTURES = 1000
-"""Most pictures of a scene: each is drawn by itself, which takes a tenth of a second."""
 
 MARGIN = 4
 """Margin of a picture's rectangle around its visible pixels [px]: the picture does not reach its edges."""
 
 SEEN = 0.5 / 255
 """Least opacity that is visible."""
-
-MAX_CAUSES = 6
-"""Kinds of elements that a line names."""
 
 
 @dataclass(frozen=True)
@@ -264,7 +256,7 @@ def load_kept(
     )
 
 
-def _in_words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:
+def _in_words(kept: Sequence[Kept], pictures: Sequence[KeptPicture] = ()) -> str:
     """Return which elements are kept and why, in one line."""
     counts: Counter[str] = Counter()
     for one in kept:
@@ -272,10 +264,11 @@ def _in_words(kept: Sequence[Kept], pictures: Sequence[Picture] = ()) -> str:
         cause = one.cause.removesuffix(", not supported").removeprefix("uses ")
         counts[tag if cause == tag else f"{tag} ({cause})"] += 1
     texts = [f"{count} {name}" if count > 1 else name for name, count in counts.items()]
-    more = f" and {len(texts) - MAX_CAUSES} more kinds" if len(texts) > MAX_CAUSES else ""
+    max_causes = 6  # kinds of elements that a line names
+    more = f" and {len(texts) - max_causes} more kinds" if len(texts) > max_causes else ""
     hidden = sum(not one.pixels.any() for one in pictures)
     unseen = f"; {hidden} of {len(pictures)} such places show nothing here" if hidden else ""
-    return ", ".join(texts[:MAX_CAUSES]) + more + unseen
+    return ", ".join(texts[:max_causes]) + more + unseen
 
 
 def _with_pictures(
@@ -296,9 +289,10 @@ def _with_pictures(
     definitions = excerpts.of(excerpts.needed([one.element for one in kept]), size)
     shared = excerpts.style(scope) + (f"<defs>{definitions}</defs>" if definitions else "")
     runs = [list(run) for _, run in groupby(parts, lambda part: isinstance(part, Kept))]
-    if sum(isinstance(run[0], Kept) for run in runs) > MAX_PICTURES:
+    max_pictures = 1000  # most pictures of a scene: each is drawn by itself, which takes a tenth of a second
+    if sum(isinstance(run[0], Kept) for run in runs) > max_pictures:
         raise ImageError(
-            f"contains elements other than paths in more than {MAX_PICTURES} places between paths"
+            f"contains elements other than paths in more than {max_pictures} places between paths"
         )
     shapes: list[Shape] = []
     is_first = True
@@ -341,7 +335,7 @@ def _picture_shape(markup: str, size: tuple[float, float], pixels: FloatArray) -
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     top, bottom = (rows[0], rows[-1] + 1) if len(rows) else (0, 1)
     left, right = (columns[0], columns[-1] + 1) if len(columns) else (0, 1)
-    picture = Picture(markup, size, (int(top), int(left)), pixels[top:bottom, left:right].copy())
+    picture = KeptPicture(markup, size, (int(top), int(left)), pixels[top:bottom, left:right].copy())
     low, high = np.array([left, top]) - MARGIN, np.array([right, bottom]) + MARGIN
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])], np.float64)
     return Shape([polygon(corners)], picture, 1.0, None, Rule.NONZERO)

@@ -14,7 +14,7 @@ import numpy as np
 
 from warpsplat.errors import ImageError
 from warpsplat.portable.linear import determinant
-from warpsplat.scene import Cap, Join, Picture, Rule
+from warpsplat.scene import Cap, Join, KeptPicture, Rule
 from warpsplat.svg.css import ANIMATED
 from warpsplat.svg.document import Document, Element, Style, name_of
 from warpsplat.svg.geometry import Matrix, outline, similarity, tight_box
@@ -22,9 +22,6 @@ from warpsplat.svg.gradients import Colouring, FlatColor, resolve_paint
 from warpsplat.svg.inspect import NUMBER
 from warpsplat.svg.paths import Points, Subpath, cubics
 from warpsplat.svg.values import SvgViewport, fraction, length, lengths, parse_color
-
-MAX_EXTENT = 1e5
-"""Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class Shape:
     """One fill or stroke, in canvas units."""
 
     subpaths: list[Subpath]
-    paint: Colouring | Picture
+    paint: Colouring | KeptPicture
     opacity: float
     """A factor on the paint's opacity."""
     line: LineStyle | None
@@ -217,21 +214,20 @@ def _check(place: Placement, subpaths: list[Subpath], line: LineStyle | None) ->
     if line and style["vector-effect"] != "none":
         raise ImageError("uses vector-effect, not supported")
     reach = np.array([line.width if line else 0.0, *(np.abs(s.points).max() for s in subpaths)])
-    if not (reach <= MAX_EXTENT).all():  # NaN fails as well
-        raise ImageError(f"a shape reaches farther than {MAX_EXTENT:g} px from the picture")
-
-
-BETWEEN_PIXELS = 1e-3
-"""Distance [px] from pixel edges within which antialiasing changes nothing."""
+    # Largest distance of a shape from the canvas's corner [px]: beyond, float32 is too coarse.
+    max_extent = 1e5
+    if not (reach <= max_extent).all():  # NaN fails as well
+        raise ImageError(f"a shape reaches farther than {max_extent:g} px from the picture")
 
 
 def _is_of_pixels(subpaths: list[Subpath]) -> bool:
     """Return whether all outlines run along pixel edges."""
+    between_pixels = 1e-3  # distance [px] from pixel edges within which antialiasing changes nothing
     for subpath in subpaths:
         ends = subpath.points[::3]
         steps = np.diff(subpath.points, axis=0, append=subpath.points[:1])
         gaps = [*np.abs(steps).min(axis=1), *np.abs(ends - np.round(ends)).ravel()]
-        if not np.max(gaps) <= BETWEEN_PIXELS:
+        if not np.max(gaps) <= between_pixels:
             return False
     return True
 

@@ -20,16 +20,11 @@ move and end."""
 USE, GRADIENT = 34, 185
 """Bytes of a ``use`` element, and of a gradient of two stops with the reference to it."""
 
-BASIC = 24
-"""Characters of a circle, or an outline of arcs, over those of a path."""
-
-LARGEST = 9
-"""Most digits that are counted."""
-
 
 def digits(numbers: Floats) -> npt.NDArray[np.intp]:
     """Return the characters of whole numbers, each with a sign or a space before it."""
-    powers = np.cumprod(np.full(LARGEST - 1, 10.0))
+    largest = 9  # most digits that are counted
+    powers = np.cumprod(np.full(largest - 1, 10.0))
     return 2 + np.searchsorted(powers, np.abs(numbers), "right")
 
 
@@ -57,6 +52,7 @@ def estimated_size(scene: Scene, per_pixel: float) -> int:
     moves = np.minimum(digits(begun), digits(np.diff(begun, axis=0, prepend=0))).sum(axis=1)
     by_contour = np.add.reduceat(np.append(size, 0), ends) - spared + moves + MOVE
     round_ones = [contour for contour, made in primitives(scene, exact) if made.radii[0] > 0]
-    by_contour[round_ones] = BASIC
+    basic = 24  # characters of a circle, or an outline of arcs, over those of a path
+    by_contour[round_ones] = basic
     elements, _ = gradients(scene, per_pixel)
     return HEAD + PATH * len(scene) + int(by_contour.sum()) + sum(map(len, elements))

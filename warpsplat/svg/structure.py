@@ -33,17 +33,8 @@ from warpsplat.svg.values import SvgViewport, fraction, parse_color
 MAX_LINKED = 100_000
 """Most elements shown through links, which may multiply."""
 
-LINKED_CHARACTERS = 50
-"""Characters of a linked element's attributes that count as one element."""
-
 MAX_WORK = 5_000_000
 """Most shapes summed over the groups that clip or fade them; nesting multiplies them."""
-
-PAIRS = 30
-"""Pairs of shapes that are compared in the time that clipping one takes."""
-
-MAX_DEPTH = 1000
-"""Deepest nesting, links included."""
 
 REFUSED = {"text", "tref", "image", "switch", "foreignObject", "video", "audio", "canvas", "iframe"}
 REFUSED |= {"mesh", "hatch"}
@@ -260,8 +251,9 @@ class _Walk:
             self._shapes += [replace(shape, element=own, level=context.level) for shape in shapes]
             self._end(end)
             return
-        if inner.depth > MAX_DEPTH:
-            raise ImageError(f"elements are nested more than {MAX_DEPTH} deep")
+        max_depth = 1000  # deepest nesting, links included
+        if inner.depth > max_depth:
+            raise ImageError(f"elements are nested more than {max_depth} deep")
         self._todo.append(end)
         if tag == "use":
             self._link(element, inner, unit)
@@ -277,8 +269,9 @@ class _Walk:
 
     def _add_linked(self, count: int, element: Element | None = None) -> None:
         """Count linked elements; the attributes of an ``element`` count as well, but for the first time."""
+        linked_characters = 50  # characters of a linked element's attributes that count as one element
         if element in self._seen_linked:
-            count += sum(map(len, element.attrib.values())) // LINKED_CHARACTERS
+            count += sum(map(len, element.attrib.values())) // linked_characters
         elif element is not None:
             self._seen_linked.add(element)
         self._linked += count
@@ -351,7 +344,8 @@ class _Walk:
         if end.clip is None and end.opacity == 1 and not isolates:
             return
         parts = self._shapes[end.first :]
-        self._work += len(parts) + (len(parts) ** 2 // PAIRS if end.opacity < 1 else 0)
+        pairs = 30  # pairs of shapes that are compared in the time that clipping one takes
+        self._work += len(parts) + (len(parts) ** 2 // pairs if end.opacity < 1 else 0)
         if self._work > MAX_WORK:
             raise ImageError("has too many shapes in nested groups with clips or opacity")
         if any(isinstance(part, Kept) and part.blends for part in parts):

@@ -14,9 +14,6 @@ from warpsplat.svg.paints import unused
 from warpsplat.svg.parts import with_parts
 from warpsplat.svg.sizes import USE
 
-DEFINITION_BYTES = 21
-"""Bytes around the path data of a definition."""
-
 
 def parts_of(scene: Scene) -> list[IndexArray]:
     """Return the contours of each part of the flat fills of cubics: an outer one, and the holes in it.
@@ -73,12 +70,13 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
     prefix = unused("s", "".join(picture.markup for picture in scene.pictures))
     definitions: list[str] = []
     names: dict[int, tuple[str, int, int]] = {}
+    definition_bytes = 21  # bytes around the path data of a definition
     for parts in alike.values():
         if len(parts) < 2:
             continue
         first = rows_of(scene, parts[0])
         data = _data_of(scene, parts[0], grid[first[0]] / units(scene, per_pixel)[first[0]], per_pixel)
-        if len(parts) * (len(data) - USE) <= len(data) + DEFINITION_BYTES:
+        if len(parts) * (len(data) - USE) <= len(data) + definition_bytes:
             continue
         name = f"{prefix}{len(definitions)}"
         definitions.append(f'<path id="{name}" d="{data}"/>')

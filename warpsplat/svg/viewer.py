@@ -22,7 +22,7 @@ import resvg_py
 from PIL import Image, PngImagePlugin
 
 from warpsplat.errors import ImageError, ResourceError, Stopped, cause_of
-from warpsplat.native import available_cores
+from warpsplat.native import STRIP_PIXELS, available_cores
 from warpsplat.svg import draw_child
 from warpsplat.svg.inspect import MAX_PIXELS, inspect_svg, svg_size
 from warpsplat.svg.write import OUR_HEAD, resized
@@ -99,8 +99,10 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
     """Return the output of ``draw_child`` for ``text``, under limits for a picture of so many ``pixels``."""
     if not pixels <= MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    seconds = round(CPU_SECONDS + CPU_PER_BYTE * len(text) + CPU_PER_PIXEL * pixels)
-    memory = round(MEMORY + MEMORY_PER_BYTE * len(text) + MEMORY_PER_PIXEL * pixels)
+    # Of the processor time [s] three times what large plain drawings take; of the address space [bytes] three
+    # layers, and 100 times the text.
+    seconds = round(CPU_SECONDS + 5e-6 * len(text) + 1.2e-7 * pixels)
+    memory = round(MEMORY + 100 * len(text) + 12 * pixels)
     options = {**options, "skip_system_fonts": TEXT.search(text) is None}
     limits = {"seconds": seconds, "memory": memory}
     request = {"path": sys.path, **limits, "form": form, "options": options}
@@ -132,15 +134,11 @@ def _drawn(form: str, text: str, options: dict[str, Any], pixels: float) -> byte
 
 
 CPU_SECONDS = 4.0
-CPU_PER_BYTE = 5e-6
-CPU_PER_PIXEL = 1.2e-7
-"""Bounds of the processor time [s]: three times what large plain drawings take."""
+"""Processor time that every file may take, besides that for its length and its pixels."""
 WALL_FACTOR = 3
 """Ratio of the bound of wall-clock time to that of processor time."""
 MEMORY = 3 << 29
-MEMORY_PER_BYTE = 100
-MEMORY_PER_PIXEL = 12
-"""Bounds of the address space [bytes]: three layers, and 100 times the text."""
+"""Address space that every file may take [bytes], likewise."""
 LIMIT_SIGNALS = (9, 24)
 """SIGKILL and SIGXCPU, which end a process at its limit of processor time."""
 
@@ -161,9 +159,6 @@ def premultiplied(image: Image.Image) -> Pixels:
 
 Bytes = npt.NDArray[np.uint8]
 Stop = Callable[[], bool]
-
-STRIP_PIXELS = 1 << 20
-"""Pixels of a strip."""
 
 WHOLE_PIXELS = 1 << 22
 """Largest SVG that is drawn in one piece [pixels]. In strips, edges move by thousandths of a pixel, because a

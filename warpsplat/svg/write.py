@@ -20,9 +20,9 @@ from warpsplat.scene import (
     Cap,
     FloatArray,
     Join,
+    KeptPicture,
     Kind,
     Paint,
-    Picture,
     Rule,
     Scene,
 )
@@ -41,26 +41,20 @@ from warpsplat.svg.symbols import with_symbols
 OPACITY_DECIMALS = 2
 """Half a unit of the third decimal changes an 8-bit colour by less than an eighth of a level."""
 
-WIDTH_STEP = 0.25
-"""Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth."""
-
 OPAQUE = 1 - 0.5 * power_of_ten(-OPACITY_DECIMALS)
 """Opacities from here on round to 1 and are left out: opaque paths are smaller and faster to draw."""
 
 GRIDS = (0.125, 0.25, 0.5, *map(float, (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 50, 100)))
 """Units of the view box to a pixel of the picture, chosen so that the box's sides have few decimals."""
 
-DASH_DECIMALS = 2
-
-MITER_LIMIT = 4.0
-"""SVG's default."""
-
 STROKE_ATTRIBUTES = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
 
 
 def width_decimals(per_pixel: float) -> int:
     """Return the number of decimals of a stroke's width."""
-    return 0 if per_pixel * WIDTH_STEP >= 1 else 1
+    # Coarsest step of a stroke's width [px]: a unit of the view box where that is as fine, else a tenth.
+    width_step = 0.25
+    return 0 if per_pixel * width_step >= 1 else 1
 
 
 def rounded(scene: Scene, per_pixel: float) -> Scene:
@@ -154,10 +148,12 @@ class _Paths:
             style += f' stroke-linecap="{cap.name.lower()}"'
         if join != shared_join:
             style += f' stroke-linejoin="{join.name.lower()}"'
-        if join == Join.MITER and scene.miter_limits[shape] != MITER_LIMIT:
+        miter_limit = 4.0  # SVG's default
+        if join == Join.MITER and scene.miter_limits[shape] != miter_limit:
             style += f' stroke-miterlimit="{number(float(scene.miter_limits[shape]), SHARE_DECIMALS)}"'
+        dash_decimals = 2
         if dash != NO_DASHES:
-            offset, *pattern = (number(value * per_pixel, DASH_DECIMALS) for value in scene.dashes[dash])
+            offset, *pattern = (number(value * per_pixel, dash_decimals) for value in scene.dashes[dash])
             style += f' stroke-dasharray="{" ".join(pattern)}"'
             style += f' stroke-dashoffset="{offset}"' if offset != "0" else ""
         return style
@@ -188,7 +184,7 @@ def path_sizes(scene: Scene, per_pixel: float) -> npt.NDArray[np.int64]:
     return np.array(sizes, np.int64)
 
 
-def _picture(picture: Picture, scene: Scene, per_pixel: float) -> str:
+def _picture(picture: KeptPicture, scene: Scene, per_pixel: float) -> str:
     """Return the markup of a picture, in the file's units."""
     across = per_pixel * scene.canvas.width / picture.size[0]
     down = per_pixel * scene.canvas.height / picture.size[1]

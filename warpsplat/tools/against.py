@@ -21,7 +21,7 @@ import warpsplat
 from warpsplat.errors import UsageError, counted, shown
 
 LABELS = {"step": "step", "forward_backward": "forward + backward", "through_torch": "through PyTorch"}
-"""What times are called in the table, besides those of stages."""
+"""Names of times in the table, besides those of stages."""
 
 HERE = str(Path(warpsplat.__file__).resolve().parent.parent)
 """Folder that this process imports warpsplat from."""
@@ -34,7 +34,7 @@ class Side:
     python: str
     """Path of the interpreter."""
     folder: str | None
-    """What it imports warpsplat from; None: as installed."""
+    """Folder that it imports warpsplat from; None: as installed."""
     device: str
 
     def run(self, *arguments: str) -> dict[str, Any]:

@@ -28,9 +28,6 @@ from warpsplat.scene import Canvas, FloatArray, Kind, Scene
 WARM_UP = 3
 """Steps that are not counted."""
 
-JITTER = 0.2
-"""Standard deviation of the control points' distance from the centre, over the radius."""
-
 
 def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, seed: int) -> Scene:
     """Return shapes of uniform centre and radius: 4 cubics on a jittered circle, or 3 on a jittered line."""
@@ -38,14 +35,15 @@ def bench_scene(name: str, curves: int, size: tuple[int, int], opacity: float, s
     rng = np.random.default_rng(seed)
     centres = rng.uniform(0, [width, height], (curves, 2))
     radii = width * rng.uniform(0.05, 0.1, curves) * (0.5 if width > 2000 else 1.0)
+    jitter = 0.2  # standard deviation of the control points' distance from the centre, over the radius
     if kind == Kind.FILL:
         circles = circle_outlines(np.zeros((curves, 2)), np.ones(curves), 2)
-        offsets = circles * (1 + JITTER * rng.normal(size=(curves, circles.shape[1], 1)))
+        offsets = circles * (1 + jitter * rng.normal(size=(curves, circles.shape[1], 1)))
     else:
         angle = rng.uniform(0, np.pi, curves)
         along = np.linspace(-1, 1, 3 * STROKE_CUBICS + 1)
         lines = along[None, :, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, None]
-        offsets = lines + JITTER * rng.normal(size=lines.shape)
+        offsets = lines + jitter * rng.normal(size=lines.shape)
     return Scene.uniform(
         kind,
         Canvas(width, height, np.zeros(3, np.float32)),

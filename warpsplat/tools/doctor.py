@@ -40,9 +40,6 @@ EXTRAS = {
 }
 """Extra -> its package and purpose."""
 
-MIN_MEMORY = 1e9
-"""Free memory that a photograph of some megapixels needs [bytes]."""
-
 
 @dataclass(frozen=True)
 class Check:
@@ -176,7 +173,8 @@ def check_machine() -> Check:
     if free is None:
         return Check(f"{cores} CPU threads", values)
     text = f"{cores} CPU threads, {free / 1e9:.1f} GB of memory free"
-    if free < MIN_MEMORY:
+    min_memory = 1e9  # free memory that a photograph of some megapixels needs [bytes]
+    if free < min_memory:
         return Check(text, values, "note", "large images need more; end other programs")
     return Check(text, values)
 

@@ -22,9 +22,6 @@ from warpsplat.torch.engine import Engine, RenderSpec
 KEPT = 32
 """Most engines that are kept, besides those whose forward pass a backward pass may still ask for."""
 
-KEPT_SHARE = 0.25
-"""Share of a device's memory that all engines may take; one is there in any case."""
-
 UNKNOWN_MEMORY = 2**33
 """Memory of a machine that does not say how much it has [bytes]."""
 
@@ -127,7 +124,8 @@ def _bytes(device: torch.device) -> int:
 def _limit(device: torch.device) -> float:
     """Return the most memory of all engines on a device."""
     own = warp_device(device)
-    return KEPT_SHARE * ((machine_memory() if own.is_cpu else own.total_memory) or UNKNOWN_MEMORY)
+    kept_share = 0.25  # share of a device's memory that all engines may take; one is there in any case
+    return kept_share * ((machine_memory() if own.is_cpu else own.total_memory) or UNKNOWN_MEMORY)
 
 
 def _captured_engine(spec: RenderSpec) -> Engine:

@@ -10,9 +10,6 @@ from warpsplat.batch.executors.work import do
 from warpsplat.fit.settings import Settings
 from warpsplat.native import available_cores, free_memory
 
-WORTHWHILE = 400_000
-"""Shapes times steps of a batch from which processes save more than the seconds that they take to start."""
-
 MEMORY = 1 << 30
 """Memory per process [bytes]: for an image of 10 million pixels."""
 
@@ -32,10 +29,12 @@ def split_cores(
         on_cpu: whether images are made on the CPU.
     """
     cores = available_cores()
+    # Shapes times steps of a batch from which processes save more than the seconds that they take to start.
+    worthwhile = 400_000
     if workers is None:
         efforts = [one.curves * one.iterations for one in settings]
         workers = 1
-        if on_cpu and sum(efforts) >= WORTHWHILE:
+        if on_cpu and sum(efforts) >= worthwhile:
             free = free_memory()
             capacity = cores if free is None else free // MEMORY
             workers = max(1, min(cores // (threads or 1), len(efforts), capacity))

@@ -28,9 +28,6 @@ log = logging.getLogger("warpsplat")
 CONTEXT: SpawnContext | ForkServerContext = multiprocessing.get_context("spawn")
 """How processes are started: on every version of Python the same way."""
 
-POLL = 0.1
-"""Seconds between two calls of ``stop``."""
-
 PAUSE = 0.2
 """Seconds between two messages about the progress of a task."""
 
@@ -115,12 +112,13 @@ class Pool(WorkerExecutor[WorkerProcess]):
         return self._workers[-1]
 
     def _receive(self, on_progress: OnProgress) -> Iterator[Outcome]:
-        ready = wait([worker.channel for worker in self._busy()], POLL)
+        poll = 0.1  # seconds between two calls of stop
+        ready = wait([worker.channel for worker in self._busy()], poll)
         for worker in [worker for worker in self._busy() if worker.channel in ready]:
             try:
                 message = worker.channel.recv()
             except (EOFError, OSError):
-                worker.process.join(POLL)
+                worker.process.join(poll)
                 worker.end()
                 message = self._lost(worker, worker.cause_of_death())
             else:

@@ -22,9 +22,6 @@ from warpsplat.errors import ResourceError, UsageError, printable
 
 log = logging.getLogger("warpsplat")
 
-POLL = 0.2
-"""Seconds between two calls of ``stop``."""
-
 PAUSE = 1.0
 """Seconds between two questions about the progress of tasks and the capacity of the cluster."""
 
@@ -146,7 +143,8 @@ class RayCluster(WorkerExecutor[RayWorker]):
         answers = {worker.answer: worker for worker in self._workers if worker.answer is not None}
         progress = {worker.progress: worker for worker in self._workers if worker.progress is not None}
         calls = [*answers, *progress]
-        ready, _ = self._ray.wait(calls, num_returns=1, timeout=POLL) if calls else ([], [])
+        poll = 0.2  # seconds between two calls of stop
+        ready, _ = self._ray.wait(calls, num_returns=1, timeout=poll) if calls else ([], [])
         for call in ready:
             if call in progress:
                 worker = progress[call]

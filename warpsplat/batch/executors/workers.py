@@ -17,9 +17,6 @@ GRACE = 60.0
 """Seconds that tasks have to end after they are asked to: to compile kernels, for a step, and for the file.
 A second signal does not wait."""
 
-MOST_STILLBORN = 3
-"""After so many workers in a row that are lost before they respond, no more are started."""
-
 
 class TaskWorker(Protocol):
     """A worker as its parent sees it."""
@@ -122,7 +119,9 @@ class WorkerExecutor(Executor, Generic[AnyWorker]):
         """
         self._remove([worker])
         self._stillborn = 0 if worker.responded else self._stillborn + 1
-        if self._stillborn >= MOST_STILLBORN:
+        # After so many workers in a row that are lost before they respond, no more are started.
+        most_stillborn = 3
+        if self._stillborn >= most_stillborn:
             raise ResourceError(f"{self.stillborn}; the last {cause}")
         task = worker.task
         if task and not self._stopping:

@@ -34,6 +34,7 @@ from warpsplat.pages.reports.pictures import (
 from warpsplat.pages.reports.shapes import contributions, listing, matched
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
+from warpsplat.scene import FloatArray
 from warpsplat.svg.read import load_kept
 from warpsplat.svg.viewer import draw
 
@@ -108,13 +109,8 @@ def report_page(
     shown = shown_image(image, name, SHORT_PIXELS if facts.figures.get("reduced") else PAGE_PIXELS)
     height, width = shown.pixels.shape[:2]
     drawn, view = picture_alone(svg, shown)
-    base, target, why_not = None, shown.pixels, ""
-    try:
-        base, target = matched(load_kept(drawn, width, height, svg_name), shown.pixels)
-    except ImageError as error:
-        why_not = str(error).removeprefix(f"{svg_name}: ")
+    target, listed, why_not = _shapes(drawn, shown.pixels, svg_name, backend)
     pixels = draw(drawn, width, height, own=own and view is None and not shown.reduced_size)
-    listed = None if base is None else listing(base, contributions(base.scene, target, backend))
     count = len(listed["kinds"]) if listed else 0
     return page(
         "report.html.j2",
@@ -140,6 +136,17 @@ def report_page(
         why_not=why_not,
         data={"svg": svg, "view": view, "listing": listed, "name": svg_name},
     )
+
+
+def _shapes(
+    drawn: str, pixels: FloatArray, name: str, backend: Backend
+) -> tuple[FloatArray, dict[str, Any] | None, str]:
+    """Return what a file is compared with, a list of its shapes, and why there is none."""
+    try:
+        base, target = matched(load_kept(drawn, pixels.shape[1], pixels.shape[0], name), pixels)
+    except ImageError as error:
+        return pixels, None, str(error).removeprefix(f"{name}: ")
+    return target, listing(base, contributions(base.scene, target, backend)), ""
 
 
 def _pictures(shown: ShownImage, errors: Any, capacity: float) -> list[dict[str, Any]]:

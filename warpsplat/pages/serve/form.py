@@ -15,9 +15,6 @@ from warpsplat.pages.serve.runs import Order
 from warpsplat.run.command_line import as_path, vectorize_command
 from warpsplat.run.options import BY_NAME, KINDS, preset_names, with_preset
 
-MOST_BUTTONS = 3
-"""Choices that are shown as buttons; more of them are a list."""
-
 SWITCHES = (*KINDS, "mixed")
 """Options that the control ``kind`` chooses from."""
 
@@ -51,7 +48,7 @@ class Control:
 
     @property
     def hint(self) -> str:
-        """What an empty value means."""
+        """The meaning of an empty value."""
         return self.words.get("", self.option.default_text or "any")
 
     @functools.cached_property
@@ -68,8 +65,9 @@ class Control:
     @property
     def type(self) -> str:
         """How the page shows it: ``buttons``, ``list``, ``slider``, ``number`` or ``text``."""
+        most_buttons = 3  # choices that are shown as buttons; more of them are a list
         if self.choices:
-            return "buttons" if len(self.choices) <= MOST_BUTTONS else "list"
+            return "buttons" if len(self.choices) <= most_buttons else "list"
         return {float: "slider", int: "text" if self.option.parse else "number"}.get(self.option.type, "text")
 
 

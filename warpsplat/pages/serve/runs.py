@@ -49,7 +49,7 @@ class Refused(Exception):  # noqa: N818 - an answer, not a fault
 
 @dataclass(frozen=True)
 class Order:
-    """What to do with an image."""
+    """An order for a run: the values of the form, and the settings that follow from them."""
 
     values: dict[str, Any]
     """Values of the form's controls, as they were given."""

@@ -1,4 +1,4 @@
-"""What the server holds: in memory, bounded, and forgotten once the page is closed."""
+"""The images and runs that the server holds: in memory, bounded, and forgotten once the page is closed."""
 
 from __future__ import annotations
 
