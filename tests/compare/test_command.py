@@ -102,7 +102,7 @@ def test_vtracer_may_be_missing(
 ) -> None:
     monkeypatch.setitem(sys.modules, "vtracer", None)
     assert run("compare", image, *QUICK) == 2
-    assert "needs vtracer, which is not installed: pip install vtracer" in one_line(capsys.readouterr().err)
+    assert "needs vtracer, which is not installed: pip install 'vtracer" in one_line(capsys.readouterr().err)
 
 
 def test_drawings_are_traced_as_vectorize_does(tmp_path: Path) -> None:
