@@ -186,7 +186,7 @@ def records() -> Iterator[ModuleType]:
 def test_pages_show_their_records_and_say_when_these_are_old(records: ModuleType) -> None:
     """Also after a change of golden files: ``python docs/remake.py``, or ``--text``, which takes a second."""
     shown = {page.name: page.read_text("utf-8") for page in records.pages()}
-    assert {"README.md", "index.md", "tutorial.md", "styles.md"} <= {*shown}
+    assert {"README.md", "index.md", "tutorial.md", "styles.md", "comparison.md"} <= {*shown}
     for name, text in shown.items():
         assert records.filled(text) == text, f"{name}: run python docs/remake.py"
         assert " {age} -->" in text, f"{name} does not say how old its figures are"
