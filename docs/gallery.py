@@ -1,13 +1,12 @@
 """The gallery's SVGs and their figures: ``python docs/gallery.py [--only NAME ...] [--force]``.
 
 ``docs/gallery/gallery.yaml`` lists the images with their settings. What is up to date (image, settings, the
-code that decides the result, and the SVG itself) is left alone. Pages and reports are made when the site is
+golden files of its subject, and the SVG itself) is left alone. Pages and reports are made when the site is
 built (``gallery_pages.py``, ``gallery_reports.py``).
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shlex
 import time
@@ -17,7 +16,9 @@ from pathlib import Path
 from typing import Any, get_args
 
 import click
+import records
 import yaml
+from records import digest
 
 import warpsplat
 from warpsplat.fit.settings import Subject
@@ -25,9 +26,6 @@ from warpsplat.fit.settings import Subject
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "gallery"
 SUBJECTS = tuple(name for name in get_args(Subject) if name not in {"auto", "silhouette"})
-
-DECIDING = ("drawing", "fit", "forms", "kernels", "portable", "rendering", "run", "scene", "search", "svg")
-"""Parts of the package whose code decides what a file becomes."""
 
 MOST_POINTS = 24
 """Of a history, in its record: as many as a small plot shows."""
@@ -128,27 +126,16 @@ def licences(folder: Path = FOLDER) -> dict[str, str]:
     return found
 
 
-def digest(data: bytes) -> str:
-    """A short hash."""
-    return hashlib.sha256(data).hexdigest()[:16]
-
-
-def code_digest() -> str:
-    """Of the code that decides what a file becomes."""
-    package = Path(warpsplat.__file__).parent
-    sources = sorted(path for part in DECIDING for path in (package / part).rglob("*.py"))
-    return digest(b"\0".join(path.read_bytes() for path in sources))
-
-
-def is_current(entry: Entry, code: str) -> bool:
+def is_current(entry: Entry) -> bool:
     """Whether the SVG is what a run would make now."""
     if not (entry.record.exists() and entry.svg.exists()):
         return False
-    made = {**entry.inputs(), "code": code, "svg": digest(entry.svg.read_bytes())}
-    return entry.figures()["made_of"] == made
+    made = {**entry.inputs(), "svg": digest(entry.svg.read_bytes())}
+    record = entry.figures()
+    return record["made_of"] == made and records.is_current(record)
 
 
-def make(entry: Entry, code: str) -> dict[str, Any]:
+def make(entry: Entry) -> dict[str, Any]:
     """Run the entry's command; write its SVG and its record.
 
     Returns:
@@ -167,13 +154,12 @@ def make(entry: Entry, code: str) -> dict[str, Any]:
         "shapes",
         "paths",
         "nodes",
-        "subject",
         "why",
         "iterations",
     )
     record = {
-        "version": warpsplat.__version__,
-        "made_of": {**entry.inputs(), "code": code, "svg": digest(entry.svg.read_bytes())},
+        **records.stamp(result.subject),
+        "made_of": {**entry.inputs(), "svg": digest(entry.svg.read_bytes())},
         "seconds": round(seconds, 1),
         **{name: figures[name] for name in kept if figures.get(name) is not None},
         "bytes": entry.svg.stat().st_size,  # on its sheet
@@ -199,24 +185,27 @@ def thinned(history: Sequence[warpsplat.Progress]) -> dict[str, list[Any]]:
     }
 
 
+def make_all(names: Sequence[str] = (), *, force: bool = False) -> None:
+    """Make what is out of date, or all, of these names or of all, one after the other on one thread."""
+    for entry in entries():
+        if (names and entry.name not in names) or (is_current(entry) and not force):
+            continue
+        made = make(entry)
+        psnr = "exact" if made.get("psnr") is None else f"{made['psnr']:.2f} dB"
+        line = f"{entry.subject}/{entry.name}: {psnr}, {made['shapes']} shapes, {made['bytes']} bytes"
+        click.echo(f"{line}, {made['seconds']} s, taken for {made['subject']}")
+
+
 @click.command()
 @click.option(
     "--only", "names", multiple=True, metavar="NAME", help="This image; may be given several times."
 )
 @click.option("--force", is_flag=True, help="Also what is up to date.")
 def main(names: tuple[str, ...], *, force: bool) -> None:
-    """Make the SVGs and the records of the gallery, one after the other on one thread."""
-    listed = entries()
-    if unknown := set(names) - {entry.name for entry in listed}:
+    """Make the SVGs and the records of the gallery."""
+    if unknown := set(names) - {entry.name for entry in entries()}:
         raise click.UsageError(f"the gallery has no {', '.join(sorted(unknown))}")
-    code = code_digest()
-    for entry in listed:
-        if (names and entry.name not in names) or (is_current(entry, code) and not force):
-            continue
-        made = make(entry, code)
-        psnr = "exact" if made.get("psnr") is None else f"{made['psnr']:.2f} dB"
-        line = f"{entry.subject}/{entry.name}: {psnr}, {made['shapes']} shapes, {made['bytes']} bytes"
-        click.echo(f"{line}, {made['seconds']} s, taken for {made['subject']}")
+    make_all(names, force=force)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import records
 from gallery import SUBJECTS, Entry, entries, licences
 
 LEGENDS = {
@@ -60,7 +61,8 @@ def pages() -> dict[str, str]:
 
 def index(listed: Sequence[Entry]) -> str:
     """All pictures, small, by subject."""
-    parts = [INTRODUCTION]
+    made = records.age(entry.figures() for entry in listed)
+    parts = [f"{INTRODUCTION}\nMade by `python docs/remake.py`: {made}.\n"]
     for subject in SUBJECTS:
         heading, legend = LEGENDS[subject]
         parts.append(f'## [{heading}]({subject}.md)\n\n{legend}\n\n<div class="thumbnails" markdown>\n')

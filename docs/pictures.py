@@ -1,19 +1,24 @@
-"""The pictures of the tutorial: draws what it starts from, then runs its commands.
+"""Pictures and figures of the README, the tutorial and the presets: ``python docs/pictures.py [NAME ...]``.
 
-``python docs/pictures.py [NAME ...]`` writes ``docs/images/sources`` and the results of these names, or all.
+Draws what the tutorial starts from, then runs the commands of these names, or of all that are out of date.
 """
 
 from __future__ import annotations
 
+import json
 import re
+import resource
 import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import records
 from PIL import Image, ImageFilter
 
 import warpsplat
@@ -95,23 +100,34 @@ COLORS = {"#": "#3b2a2a", "o": "#e2873b", "-": "#b9602a", "p": "#f2a7a0", "w": "
 
 CAT = "docs/images/cat.jpg"
 SOURCES = "docs/images/sources"
-FIRST = "docs/images"
-RESULTS = "docs/images/tutorial"
+PHOTOGRAPHS = "docs/gallery/images/photo"
+STYLES = ("low-poly", "poster", "stained-glass", "brush", "ink", "placeholder")
+
 COMMANDS = {
-    "cat": f"vectorize {CAT} --curves 512 --closed",
-    "cat-strokes": f"vectorize {CAT} --curves 512 --open",
-    "16": f"vectorize {CAT} --curves 16",
-    "64": f"vectorize {CAT} --curves 64",
-    "256": f"vectorize {CAT} --curves 256",
-    "strokes": f"vectorize {CAT} --curves 256 --open",
-    "poster": f"vectorize {CAT} --curves 128 --palette {SOURCES}/inks.txt",
-    "face": f"vectorize {CAT} --curves 64 --importance {SOURCES}/mask.png",
-    "refined": f"refine {SOURCES}/by-hand.svg {CAT}",
-    "logo": f"vectorize {SOURCES}/logo.png",
-    "sketch": f"vectorize {SOURCES}/sketch.jpg --subject line",
-    "sprite": f"vectorize {SOURCES}/sprite.png",
+    "start/cat": f"vectorize {CAT} --curves 512 --closed",
+    "tutorial/16": f"vectorize {CAT} --curves 16",
+    "tutorial/64": f"vectorize {CAT} --curves 64",
+    "tutorial/256": f"vectorize {CAT} --curves 256",
+    "tutorial/strokes": f"vectorize {CAT} --curves 256 --open",
+    "tutorial/poster": f"vectorize {CAT} --curves 128 --palette {SOURCES}/inks.txt",
+    "tutorial/face": f"vectorize {CAT} --curves 64 --importance {SOURCES}/mask.png",
+    "tutorial/refined": f"refine {SOURCES}/by-hand.svg {CAT}",
+    "tutorial/logo": f"vectorize {SOURCES}/logo.png",
+    "tutorial/sketch": f"vectorize {SOURCES}/sketch.jpg --subject line",
+    "tutorial/sprite": f"vectorize {SOURCES}/sprite.png",
+    **{
+        f"styles/{name}-{style}": f"vectorize {PHOTOGRAPHS}/{name}.jpg --preset {style}"
+        for name in ("coffee", "dahlia", "peaks")
+        for style in STYLES
+    },
 }
-"""By the names of the results: the first two are the README's, the others the tutorial's."""
+"""By the names of the records (``records.py``): the README's, the tutorial's, those of the presets."""
+
+SUGGESTION = f"vectorize {CAT} --suggest"
+"""Whose lines the tutorial shows."""
+
+KEPT = ("psnr", "ssim", "ssimulacra2", "bytes", "gzip_bytes", "shapes", "paths", "nodes", "psnr_before")
+"""Figures of a run that records keep."""
 
 
 def sprite() -> Image.Image:
@@ -135,7 +151,7 @@ def sketch() -> Image.Image:
 
 def mask() -> Image.Image:
     """White over the eyes and the nose of the cat, soft at the edges."""
-    image = Image.open(CAT).convert("L")
+    image = Image.open(ROOT / CAT).convert("L")
     y, x = np.mgrid[: image.height, : image.width]
     spots = ((170, 115, 42), (318, 136, 34), (264, 244, 34))
     inside = np.any([np.hypot(x - column, y - row) < radius for column, row, radius in spots], axis=0)
@@ -159,22 +175,75 @@ def own_loss() -> None:
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(ROOT / CAT, folder)
         subprocess.run([sys.executable, "-c", code], check=True, cwd=folder)
-        shutil.copy(Path(folder, "own.svg"), ROOT / RESULTS)
-    warpsplat.save_svg(warpsplat.starting_scene(CAT, 64), f"{RESULTS}/own-start.svg")
+        shutil.copy(Path(folder, "own.svg"), picture("tutorial/own"))
+    warpsplat.save_svg(warpsplat.starting_scene(ROOT / CAT, 64), picture("tutorial/own-start"))
 
 
-def main(names: list[str]) -> None:
-    """Write the sources and the results of these names."""
+def picture(name: str) -> Path:
+    """Return where the SVG of a record is."""
+    return ROOT / "docs" / "images" / f"{name.removeprefix('start/')}.svg"
+
+
+def run(line: str, *more: str) -> tuple[str, float]:
+    """Return what a command of warpsplat prints, and the CPU seconds that it takes, from start to end."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-m", "warpsplat", *shlex.split(line), "--device", "cpu", *more]
+    made = subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return made.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def made_of(name: str) -> dict[str, str]:
+    """Return what tells whether an SVG is that of its record's command."""
+    line = COMMANDS[name]
+    files = [ROOT / word for word in shlex.split(line) if word.startswith("docs/")]
+    return {
+        "command": line,
+        "files": records.digest(b"".join(path.read_bytes() for path in files)),
+        "svg": records.digest(picture(name).read_bytes()),
+    }
+
+
+def is_current(name: str) -> bool:
+    """Return whether a picture and its figures are what its command makes today."""
+    group, _, rest = name.partition("/")
+    record = records.read(group).get(rest)
+    return bool(record and records.is_current(record) and record["made_of"] == made_of(name))
+
+
+def make(name: str) -> dict[str, Any]:
+    """Run a command; write its SVG and its record, and return this."""
+    group, _, rest = name.partition("/")
+    printed, seconds = run(COMMANDS[name], "-o", str(picture(name)), "--overwrite", "--quiet", "--json")
+    figures = json.loads(printed)
+    subject = "refined" if COMMANDS[name].startswith("refine") else figures["subject"]
+    kept = {key: round(figures[key], 4) for key in KEPT if figures.get(key) is not None}
+    record = {**records.stamp(subject), "made_of": made_of(name), "cpu": round(seconds, 1), **kept}
+    records.write(group, rest, record)
+    return record
+
+
+def suggest() -> None:
+    """Record the lines of a suggestion."""
+    printed, seconds = run(SUGGESTION, "--quiet")
+    lines = printed.replace(CAT, "cat.jpg").rstrip()
+    record = {**records.stamp("photo"), "cpu": round(seconds, 1), "printed": lines}
+    records.write("tutorial", "suggest", record)
+
+
+def main(names: Sequence[str] = ()) -> None:
+    """Draw the sources, and make what is out of date, or what is named."""
     sources()
-    for name in names:
-        if name == "own":
-            own_loss()
-            continue
-        folder = FIRST if name.startswith("cat") else RESULTS
-        line = f"{COMMANDS[name]} -o {folder}/{name}.svg"
-        print(line, flush=True)
-        subprocess.run([sys.executable, "-m", "warpsplat", *shlex.split(line)], check=True)
+    for name in names or [name for name in COMMANDS if not is_current(name)]:
+        record = make(name)
+        psnr = record.get("psnr", "exact")
+        print(f"{name}: {psnr} dB, {record['bytes']} bytes, {record['cpu']} s", flush=True)
+    known = records.read("tutorial").get("suggest")
+    if not (names or (known and records.is_current(known))):
+        suggest()
+        own_loss()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [*COMMANDS, "own"])
+    main(sys.argv[1:])
+    records.fill_pages()

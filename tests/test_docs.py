@@ -6,6 +6,7 @@ Python blocks that are whole programs are marked ``python``; fragments are marke
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import runpy
 import shlex
@@ -141,6 +142,45 @@ def test_figures_are_drawn_from_the_renderer(tmp_path: Path) -> None:
     for path in tmp_path.iterdir():
         drawn, committed = (render_svg(each.read_text("utf-8")) for each in (path, kept / path.name))
         assert drawn.size == committed.size
+
+
+@pytest.fixture(scope="module")
+def records() -> Iterator[ModuleType]:
+    """The records of the pages' figures, imported as the scripts beside it import it."""
+    sys.path.insert(0, str(ROOT / "docs"))
+    yield importlib.import_module("records")
+    sys.path.remove(str(ROOT / "docs"))
+
+
+def test_pages_show_their_records_and_say_when_these_are_old(records: ModuleType) -> None:
+    """Also after a change of golden files: ``python docs/remake.py``, or ``--text``, which takes a second."""
+    shown = {page.name: page.read_text("utf-8") for page in records.pages()}
+    assert {"README.md", "index.md", "tutorial.md", "styles.md", "comparison.md"} <= {*shown}
+    for name, text in shown.items():
+        assert records.filled(text) == text, f"{name}: run python docs/remake.py"
+        assert " {age} -->" in text, f"{name} does not say how old its figures are"
+
+
+def test_pictures_are_those_of_their_records(records: ModuleType) -> None:
+    pictures = importlib.import_module("pictures")
+    for name in pictures.COMMANDS:
+        group, _, rest = name.partition("/")
+        assert records.read(group)[rest]["made_of"] == pictures.made_of(name), (
+            f"python docs/pictures.py {name}"
+        )
+
+
+def test_a_record_is_old_when_golden_files_of_its_subject_change(
+    records: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digests = json.loads(records.GOLDEN.read_text("utf-8"))
+    made = {name: records.stamp(name) for name in ("photo", "drawing", "line", "pixel", "refined")}
+    assert len({record["golden"] for record in made.values()}) == len(made)
+    monkeypatch.setattr(records, "GOLDEN", tmp_path / "digests.json")
+    records.GOLDEN.write_text(json.dumps({**digests, "drawing": "another"}))
+    assert [name for name, record in made.items() if not records.is_current(record)] == ["drawing"]
+    assert "before the last change of results" in records.age(made.values())
+    assert "before" not in records.age([made["photo"]])
 
 
 OTHERS = {"pydiffvg.md"}

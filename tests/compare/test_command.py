@@ -93,7 +93,7 @@ def test_an_interruption_publishes_the_rows_so_far(
 def test_vtracer_may_be_missing(image: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "vtracer", None)
     said = cli("compare", image, *QUICK, code=2).line
-    assert "needs vtracer, which is not installed: pip install vtracer" in said
+    assert "needs vtracer, which is not installed: pip install 'vtracer" in said
 
 
 def test_drawings_are_traced_as_vectorize_does(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from tests.helpers import adjoint, compare, renderer_for
 from tests.scenes import disc, mixed_scene, picture_scene, random_scene, with_gradients, with_stops
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.scene import NO_PICTURE, Canvas, Kind, Paint, KeptPicture, Scene, Spread
+from warpsplat.scene import NO_PICTURE, Canvas, KeptPicture, Kind, Paint, Scene, Spread
 
 
 def transparent(scene: Scene) -> Scene:
