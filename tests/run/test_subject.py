@@ -180,6 +180,17 @@ def test_a_drawing_that_shows_little_is_fitted(monkeypatch: pytest.MonkeyPatch) 
     assert result.why == "as a drawing it would show too little of the image"
 
 
+def test_a_drawing_without_background_is_fitted_and_scored_as_a_photograph(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given = {"background": "none", **FEW}
+    asked = warpsplat.vectorize(soft_stroke(), subject="photo", **given)
+    monkeypatch.setattr(prepare, "guess_subject", lambda target: Guess("drawing", "it was drawn"))
+    found = warpsplat.vectorize(soft_stroke(), **given)
+    assert found.subject == "photo"
+    assert found.svg == asked.svg and found.score == asked.score
+
+
 @pytest.mark.parametrize(
     "given", [{"colors": 2}, {"max_bytes": 400}, {"detail": 0.0}, {"subject": "drawing"}]
 )

@@ -128,11 +128,11 @@ def make_result(
     begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
     checkpoint = run.checkpoint
     image = with_pixels(image)
-    target, reduction = image.problem.target, image.reduction
-    run = timed(recorded(run, history), image.problem.settings, target)
+    run = timed(recorded(run, history), image.problem.settings, image.problem.target)
     with naming(image.name):
         image, strategy, made = _fitted(image, run, start)
-        problem, settings = image.problem, image.problem.settings
+        problem, reduction = image.problem, image.reduction
+        target, settings = problem.target, problem.settings
         report_end(made, run, history)
         optics = explained(made, problem) if made.is_sharper and not made.interrupted else None
         made = _arranged(made, problem, strategy, run)
@@ -181,11 +181,10 @@ def _fitted(image: PreparedImage, run: Run, start: Start | None) -> tuple[Prepar
     Raises:
         DeviceError: the device failed before there was anything to save.
     """
-    target = image.problem.target
     while True:
         problem = image.problem
         strategy = choose_strategy(problem.settings) if start is None else STRATEGIES["fit"]
-        part = run if strategy.traces else before_clearing(run, target)
+        part = run if strategy.traces else before_clearing(run, problem.target)
         if start is not None:
             from warpsplat.fit.loop import fit
 
