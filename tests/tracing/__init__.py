@@ -1,1 +1,1 @@
-"""Kernels that say what they read, write and compute: for a test of races, and to count a step."""
+"""Kernels that say what they read and write: for a test of races."""

@@ -21,8 +21,8 @@ from warp._src import context
 from warpsplat.rendering import program as programs
 from warpsplat.rendering.program import Launch, Program
 
-WORD, SECTOR = 4, 32
-"""Bytes that are followed each, and bytes that a GPU's memory is read and written by."""
+WORD = 4
+"""Bytes that are followed each."""
 
 TRACED = {
     "extra_build_options": wp.ModuleBuildOptions(
@@ -78,54 +78,19 @@ class Race:
     """How many."""
 
 
-@dataclass(frozen=True)
-class Memory:
-    """What a launch does to the memory of an array [bytes]."""
-
-    read: int
-    """As often as it is asked for."""
-    written: int
-    sectors_read: int
-    """Each sector once."""
-    sectors_written: int
-
-
-@dataclass(frozen=True)
-class Count:
-    """What a launch reads, writes and computes."""
-
-    stage: str
-    kernel: str
-    threads: int
-    memory: dict[str, Memory]
-    """By the parameters that name an array."""
-    simple: int
-    """Floating-point additions, products, comparisons."""
-    slow: int
-    """Divisions and square roots."""
-    longest: int
-    """Loads of the thread that has most."""
-
-    @property
-    def bytes(self) -> int:
-        """Return the bytes that have to come from memory or go there, each sector once."""
-        return sum(one.sectors_read + one.sectors_written for one in self.memory.values())
-
-
 @dataclass
 class Tracer:
     """Collects what launches do; made by ``tracing``."""
 
     rng: np.random.Generator | None = None
     """Shuffles the threads of each launch; without, they run in their order."""
-    counts: list[Count] = field(default_factory=list)
     races: list[Race] = field(default_factory=list)
     outside: set[str] = field(default_factory=set)
     """Kernels that touched memory of none of their arrays."""
     kernels: set[str] = field(default_factory=set)
     """Names of all that were launched."""
 
-    def run(self, stage: str, command: wp.Launch) -> None:
+    def run(self, command: wp.Launch) -> None:
         """Launch ``command`` and look at what it does."""
         kernel = command.kernel
         threads = int(command.params[0].size)
@@ -136,10 +101,6 @@ class Tracer:
         _entry(kernel)(ctypes.byref(trace))
         command.launch()
         assert trace.thread, f"{kernel.key} asks for its thread in a way that trace.h does not know"
-        longest = max(trace.longest, trace.loads)
-        self.counts.append(
-            Count(stage, kernel.key, threads, memory.used(), trace.simple, trace.slow, longest)
-        )
         self.kernels.add(kernel.key)
         self.races += memory.races(kernel.key)
         if trace.outside:
@@ -160,21 +121,13 @@ class _Regions:
                 merged.append(([name], begin, end))
         self.names = [", ".join(names) for names, _, _ in merged]
         self.regions = (_Region * len(merged))()
-        self._touched: list[tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]] = []
+        self._touched: list[tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]] = []  # kept for C
         for region, (_, begin, end) in zip(self.regions, merged, strict=True):
             words = -(-(end - begin) // WORD)
             writer, reader = np.zeros(words, np.uint32), np.zeros(words, np.uint32)
             self._touched.append((writer, reader))
             region.begin, region.end = begin, end
             region.writer, region.reader = writer.ctypes.data, reader.ctypes.data
-
-    def used(self) -> dict[str, Memory]:
-        """Return what was read and written, by array."""
-        return {
-            name: Memory(region.bytes_read, region.bytes_written, _sectors(reader), _sectors(writer))
-            for name, region, (writer, reader) in zip(self.names, self.regions, self._touched, strict=True)
-            if region.bytes_read or region.bytes_written
-        }
 
     def races(self, kernel: str) -> list[Race]:
         """Return what threads did to each other."""
@@ -184,12 +137,6 @@ class _Regions:
             for kind, count in zip(KINDS, region.races, strict=True)
             if count
         ]
-
-
-def _sectors(words: npt.NDArray[np.uint32]) -> int:
-    """Return the bytes of the sectors that have a word which is not 0."""
-    starts = np.arange(0, len(words), SECTOR // WORD)
-    return SECTOR * int(np.count_nonzero(np.bitwise_or.reduceat(words, starts))) if len(words) else 0
 
 
 def _arrays(kernel: wp.Kernel, values: list[Any]) -> list[tuple[str, int, int]]:
@@ -221,21 +168,6 @@ def _entry_of(handle: str) -> Any:
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
 
 
-def _library_count(stage: str, function: Any, arguments: tuple[Any, ...]) -> Count:
-    """Return what a scan or a sort does on a GPU, where both are CUB's: a pass over the numbers; a pass for
-    the digits' histograms, and one for each digit of 8 bits.
-    """
-    if function is wp.utils.array_scan:
-        size = 4 * arguments[0].shape[0]
-        memory = Memory(size, size, size, size)
-    else:
-        assert function is wp.utils.radix_sort_pairs
-        size, passes = 4 * arguments[2], -(-arguments[4] // 8)
-        read, written = (2 * passes + 1) * size, 2 * passes * size
-        memory = Memory(read, written, read, written)
-    return Count(stage, function.__name__, size // 4, {"": memory}, 0, 0, 0)
-
-
 @contextlib.contextmanager
 def tracing(tracer: Tracer) -> Iterator[Tracer]:
     """Trace all launches that are recorded within the block, also where they are replayed after it.
@@ -243,31 +175,21 @@ def tracing(tracer: Tracer) -> Iterator[Tracer]:
     Steps made for two threads are not captured as graphs; their launches are not split here.
     """
     before: dict[wp.Module, dict[str, Any]] = {}
-    original, original_call = Program.launch, Program.call
+    original = Program.launch
 
     def launch(self: Program, kernel: wp.Kernel, dim: Any, *sources: object, **values: Any) -> None:
         _compile_traced(kernel.module, before)
         count = len(self.launches)
         original(self, kernel, dim, *sources, **{**values, "split": False})
         if len(self.launches) > count:
-            stage, (command, _) = self.stage, self._commands[-1]
-            self.launches[-1] = Launch(stage, kernel.key, (lambda: tracer.run(stage, command),))
+            command, _ = self._commands[-1]
+            self.launches[-1] = Launch(self.stage, kernel.key, (lambda: tracer.run(command),))
 
-    def call(self: Program, function: Any, *arguments: Any) -> None:
-        count = _library_count(self.stage, function, arguments)
-
-        def run() -> None:
-            tracer.counts.append(count)
-            function(*arguments)
-
-        self.launches.append(Launch(self.stage, function.__name__, (run,)))
-
-    programs.Program.launch, programs.Program.call = launch, call  # type: ignore[method-assign]
+    programs.Program.launch = launch  # type: ignore[method-assign]
     try:
         yield tracer
     finally:
         programs.Program.launch = original  # type: ignore[method-assign]
-        programs.Program.call = original_call  # type: ignore[method-assign]
         for module, options in before.items():
             module.options.clear()
             module.options.update(options)
