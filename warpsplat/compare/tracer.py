@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
+from typing import Any
 
 from warpsplat.errors import UsageError
 from warpsplat.native import messages_hidden
 
-TracerOptions = Mapping[str, str | int | float]
+TracerOptions = Mapping[str, Any]
 """Arguments of a tracer, by its own names."""
 
 
