@@ -19,12 +19,10 @@ def fewer_regions(regions: Regions, most: int, price: float = 1.0) -> Regions:
     Args:
         regions: All take as many bytes, so that no size has to be known.
         most: Regions that are left at the most.
-        price: Of a byte, over its usual one: beyond 1, regions that show less than that is worth go too.
+        price: Of a byte, over its usual one: regions that show less than their bytes are worth go too.
     """
     count = len(regions.paint)
-    if count <= most and price <= 1:
-        return regions
-    dearest = 3 * least_worth(count, regions.labels.size, regions.noise, price=max(price - 1, 0))
+    dearest = least_worth(count, regions.labels.size, regions.noise, price=price)
     beside: list[set[int]] = [set() for _ in range(count)]
     for a, b in shared_borders(regions.labels, count):
         beside[a].add(b)
@@ -50,14 +48,17 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
         most: Regions that are to be left.
         dearest: Squared error that a merge may add if there are no more [levels squared].
     """
-    left, merged = len(beside), np.arange(len(beside))
+    left, merged, sums = len(beside), np.arange(len(beside)), colors * np.array(sizes)[:, None]
     heap: list[tuple[float, int, int, int]] = []  # cost, region, neighbour, size of the region at the time
 
     def push(region: int) -> None:
         """Queue the merge of a region into the neighbour that it costs least."""
         if beside[region]:
             near = list(beside[region])
-            costs = sizes[region] * ((colors[near] - colors[region]) ** 2).sum(axis=1)
+            # Pixels that it took from others are of their own colours still.
+            change = colors[near] - colors[region]
+            middle = (colors[near] + colors[region]) * (sizes[region] / 2)
+            costs = 2 * (change * (middle - sums[region])).sum(axis=1)
             best = int(costs.argmin())
             heapq.heappush(heap, (float(costs[best]), region, near[best], sizes[region]))
 
@@ -75,6 +76,7 @@ def _merge(beside: list[set[int]], sizes: list[int], colors: Floats, most: int, 
         merged[region] = into
         left -= 1
         sizes[into] += sizes[region]
+        sums[into] += sums[region]
         for other in beside[region]:
             beside[other].discard(region)
             if other != into:
