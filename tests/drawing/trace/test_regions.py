@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
-from warpsplat.drawing.trace.fewer import fewer_regions
+from warpsplat.drawing.trace.fewer import _merge, fewer_regions
 from warpsplat.drawing.trace.grids import components
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
@@ -94,7 +94,17 @@ def test_regions_seen_least_go_first() -> None:
     assert colors_of(three) == {(255, 255, 255, 255), (0xCC, 0, 0, 255), (0, 0xAA, 0, 255)}
     assert three.labels[30, 30] == three.labels[12, 12]
     assert colors_of(two) == {(255, 255, 255, 255), (0xCC, 0, 0, 255)}
-    assert fewer_regions(found, 4) is found
+    assert (fewer_regions(found, 4).labels == found.labels).all()
+
+
+def test_merged_regions_are_judged_by_their_own_pixels() -> None:
+    """Or shading would be merged step by step, each of which costs little."""
+    colors = np.array([[0, 0, 0, 255], [10, 0, 0, 255], [20, 0, 0, 255]])
+    merged = [
+        _merge([{1}, {0, 2}, {1}], [10, 10, 99], colors, most=3, dearest=dearest).tolist()
+        for dearest in (999, 3999, 4000)
+    ]
+    assert merged == [[0, 1, 2], [1, 1, 2], [2, 2, 2]]
 
 
 def test_paper_between_dense_lines_is_paper() -> None:
