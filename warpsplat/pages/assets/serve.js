@@ -140,16 +140,22 @@
   }
 
   let due = null;
+  let asked = { request: "", id: null }; // the latest request, and its run
   const start = attempt(async () => {
     clearTimeout(due);
     complain("", "refused");
     if (!current) return;
     const request = JSON.stringify({ image: current, settings: chosen() });
+    const run = model.runs.find((each) => each.id === asked.id);
+    const isMade = asked.id === null || (run && !["failed", "stopped"].includes(run.state));
+    if (request === asked.request && isMade) return; // as when a change has begun it before the button did
+    const one = (asked = { request, id: null });
     const before = follow;
     follow = "coming"; // it replaces a run that is not over, whose picture stays until there is a new one
     try {
-      follow = (await made("/runs", request, "application/json")).run;
+      one.id = follow = (await made("/runs", request, "application/json")).run;
     } catch (error) {
+      one.request = "";
       follow = before;
       throw error;
     }
