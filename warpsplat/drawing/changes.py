@@ -29,7 +29,7 @@ class Alternative:
     """Other points and joints for some contours."""
 
     contours: Outlines
-    """What takes the places of contours."""
+    """Contours that replace others."""
     cubics: Floats
     """The pieces before and after it, shape (piece, 4, 2)."""
     saved: float

@@ -82,7 +82,7 @@ class Seen:
     """The pixels that are not flat, shape (height, width)."""
     edges: Edges
     noise: float
-    """Of flat colours [levels]."""
+    """Noise of flat colours [levels]."""
     is_halved: bool
     """Whether its colours have half the resolution of its lightness, and so do not tell the kernel."""
     has_kernel: bool = True

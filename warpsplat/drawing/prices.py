@@ -1,4 +1,4 @@
-"""What things take in the file of a drawing, and what a byte is worth: every change is judged by these.
+"""Bytes that parts of a drawing take in its file, and what a byte is worth: every change is judged by these.
 
 What a thing takes is counted in numbers of path data, since letters are mostly shared by several pieces.
 """

@@ -32,7 +32,7 @@ class WidthProfile(NamedTuple):
     points: Floats
     """Shape (place, 2)."""
     lengths: Floats
-    """Of the stroke around each place [px], shape (place,)."""
+    """Width of the stroke around each place [px], shape (place,)."""
 
 
 def cut_at_steps(strokes: Scene, lack: Floats, price: float) -> tuple[Scene, Ints]:

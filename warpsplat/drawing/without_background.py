@@ -1,4 +1,4 @@
-"""What lies on the plain ground of a photograph: its opacity, and its colours without the ground's."""
+"""Opacity and colours, without the ground's, of objects photographed on plain ground."""
 
 from __future__ import annotations
 

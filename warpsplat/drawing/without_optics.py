@@ -38,7 +38,7 @@ class HasScene(Protocol):
 
     @property
     def scene(self) -> Scene:
-        """What it shows."""
+        """The scene that it shows."""
 
 
 Traced = TypeVar("Traced", bound=HasScene)

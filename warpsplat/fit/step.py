@@ -101,7 +101,7 @@ class Step:
     def _aim(self, target: Target, capacity: Capacity | None = None, began: int | None = None) -> None:
         self.target = target
         self.loss_target = self._new_loss_target()
-        """What renders are compared with: the image, or what ``evaluate_file`` makes of it."""
+        """Target that renders are compared with: the image, or what ``evaluate_file`` makes of it."""
         self._allocate(capacity, began)
 
     def rebuild(self) -> None:

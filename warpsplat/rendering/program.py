@@ -53,7 +53,7 @@ class Program:
         """Name of the launches that are added from now on, for ``run_timed``."""
         self._launches: list[Launch] = []
         self._added: list[Callable[[], Launch]] = []
-        """What records the launches that were added since."""
+        """Recording of the launches that were added since."""
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
         self._commands: list[tuple[wp.Launch, ctypes.Structure | None]] = []

@@ -91,7 +91,7 @@ class Engine:
         self._take = self._record(pixels.pixels_to_tiles, buffers.image_grad, backend, spec.viewport)
         self.lock = threading.Lock()
         self.number = 0
-        """Of the forward pass in the buffers; 0: there is none."""
+        """Number of the forward pass in the buffers; 0: there is none."""
         self._ticket: Callable[[], Ticket | None] = _no_ticket
         self.is_captured = False
         """Whether a CUDA graph of torch holds its programs, which then must stay as they are."""
