@@ -91,7 +91,8 @@ def test_from_a_drop_to_all_files(visit: Page, tmp_path: Path) -> None:
     page = visit
     drop(page, disc(), "disc.png")
     first = done(page, "automatic")
-    assert shown(page, "left") == "Original" and shown(page, "right") == "automatic"
+    wait_until(page, lambda: shown(page, "right") == "automatic")
+    assert shown(page, "left") == "Original"
     assert page.evaluate("document.activeElement.id") == "preset"
     page.select_option("#preset", "laser-cut")
     assert page.input_value("#detail") == "0.35" and page.input_value("#subject") == "drawing"
@@ -99,7 +100,8 @@ def test_from_a_drop_to_all_files(visit: Page, tmp_path: Path) -> None:
     assert page.get_by_role("radio", name="Everywhere").is_checked()
     assert page.get_by_role("radio", name="No", exact=True).is_disabled()
     card = done(page, "laser-cut")
-    assert first.count() == 1 and shown(page, "right") == "laser-cut"
+    wait_until(page, lambda: shown(page, "right") == "laser-cut")
+    assert first.count() == 1
     starts = {"SVG": "<svg", "PNG": "\x89PNG", "EPS": "%!PS", "Report": "<!doctype html>"}
     further = {"PDF": "%PDF", "DXF": "  0\nSECTION"}
     for label, begins in {**starts, **further}.items():
@@ -117,6 +119,19 @@ def test_from_a_drop_to_all_files(visit: Page, tmp_path: Path) -> None:
     assert (tmp_path / "svg").read_text() == made.svg
     command = card.get_by_role("button", name="Copy command").get_attribute("title")
     assert command == "warpsplat vectorize disc.png --preset laser-cut -o disc.svg"
+
+
+def test_a_run_that_ends_before_its_number_is_known(visit: Page) -> None:
+    """It is shown as well: the answer that names a run may come after the news of its end."""
+    page = visit
+    answers = []
+    page.route("**/runs", lambda route: answers.append((route, route.fetch())))
+    drop(page, disc(), "disc.png")
+    done(page, "automatic")
+    assert shown(page, "right") == "Original"
+    route, answer = answers.pop()
+    route.fulfill(response=answer)
+    wait_until(page, lambda: shown(page, "right") == "automatic")
 
 
 def test_fields_become_settings(visit: Page) -> None:
@@ -145,6 +160,7 @@ def test_two_settings_of_an_image_are_compared_and_one_is_saved(visit: Page, tmp
     start(page, 8)
     other = done(page, "photograph, shapes 8")
     assert one.count() == other.count() == 1
+    wait_until(page, lambda: shown(page, "right") == "photograph, shapes 8")
     assert shown(page, "left") == "Original"
     one.get_by_role("button", name="Left").click()
     assert shown(page, "left") == "photograph, shapes 4"
@@ -161,7 +177,7 @@ def test_two_settings_of_an_image_are_compared_and_one_is_saved(visit: Page, tmp
     count = page.locator(".run").count()
     other.get_by_role("button", name="Remove").click()
     page.wait_for_selector(f".run:nth-child({count})", state="detached")
-    assert shown(page, "right") == "Original"
+    wait_until(page, lambda: shown(page, "right") == "Original")
     assert fits_a_phone(page)
 
 

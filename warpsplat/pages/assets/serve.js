@@ -159,6 +159,7 @@
       follow = before;
       throw error;
     }
+    show(); // a short run may be over before its number is here
   }, "refused");
   form.addEventListener("submit", (event) => {
     event.preventDefault();
