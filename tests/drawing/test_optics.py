@@ -12,6 +12,8 @@ from PIL import Image, ImageFilter
 
 import warpsplat
 from tests.drawing.trace.drawings import decibels, draw
+from warpsplat.drawing import optics as optics_module
+from warpsplat.drawing import without_optics as without_optics_module
 from warpsplat.drawing.constraints import DRAFT_GRID
 from warpsplat.drawing.edges import LINEAR, MIDDLES, find_edges
 from warpsplat.drawing.optics import NONE, SCALE, Seen
@@ -92,6 +94,40 @@ def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late:
 
     result, _ = without_optics(image, None, once, show, lambda: is_late)
     assert result is image and len(traced) == 1
+
+
+def test_a_part_of_a_large_picture_tells_whether_there_is_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A blur is undone in it; a shape that its trace does not explain, as a fine checkerboard, is no blur."""
+    monkeypatch.setattr(without_optics_module, "LOOK", 40)
+    blurred = pixels(MADE["blurred"]())
+    result, _ = without_optics(blurred, None, trace, show, bool)
+    assert decibels(result, pixels(small(BOX))) > decibels(blurred, pixels(small(BOX))) + 4
+    traced = list[tuple[int, ...]]()
+
+    def counted(each: FloatArray) -> Traced:
+        traced.append(each.shape[:2])
+        return trace(each)
+
+    odd = pixels(small(BOX)).copy()
+    odd[40:70, 4:34] = (np.indices((30, 30)).sum(axis=0) % 2)[..., None]
+    result, _ = without_optics(odd, None, counted, show, bool)
+    assert result is odd
+    assert traced == [(SIDE, SIDE), (40, 40), (40, 40)], "then the part, as it is and without a kernel"
+
+
+def test_a_kernel_is_told_by_few_pixels_and_by_strips(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, fine = Seen.of(pixels(MADE["blurred"]())), pixels(small(BOX, SCALE))
+    whole = seen.find(fine)
+    monkeypatch.setattr(optics_module, "STRIP", 7)
+    strips = seen.find(fine)
+    assert strips.kernel == whole.kernel
+    np.testing.assert_array_equal(strips.undone, whole.undone)
+    monkeypatch.setattr(optics_module, "MOST_TOLD", 700)
+    few = seen.find(fine)
+    assert few.kernel != whole.kernel
+    np.testing.assert_allclose(few.kernel, whole.kernel, atol=0.01)
+    assert decibels(few.undone, whole.undone) > 40
+    assert few.error / few.without == pytest.approx(whole.error / whole.without, rel=0.2)
 
 
 @pytest.mark.parametrize("how", MADE)

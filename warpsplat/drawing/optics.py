@@ -34,6 +34,12 @@ RADIUS = 5
 ROUNDS = 4
 """Solutions for a kernel, as each tells which pixels it would clip."""
 
+MOST_TOLD = 1 << 17
+"""Pixels that tell the kernel, which bounds time and memory."""
+
+STRIP = 64
+"""Rows of pixels that are looked at together, which bounds the memory."""
+
 RIDGE = 0.01
 """What the mean of the diagonal counts besides in the normal equations: edges of few directions leave weights
 open, which stay small then."""
@@ -133,16 +139,17 @@ class Seen:
         mean = reduce(np.add, [fine[y::SCALE, x::SCALE] for y, x in np.ndindex(SCALE, SCALE)]) / COUNTS[0]
         beside = dilated(self.uneven | _uneven(fine, 0)[::SCALE, ::SCALE], 2 * RADIUS // SCALE)
         some = np.nonzero(beside)
-        rings = _rings(fine if light is None else _levels(light), *some)
-        steps = self._steps(fine, some)
-        kernel, error = self._kernel(rings, steps, some)
-        without = _squared(self._planes(self.levels[some] - _rounded(mean[some])))
+        light = fine if light is None else _levels(light)
+        every = max(-(-len(some[0]) // MOST_TOLD), 1)
+        told = some[0][::every], some[1][::every]
+        kernel, error = self._kernel(_rings(light, *told), self._steps(fine, told), told)
+        without = _squared(self._planes(self.levels[told] - _rounded(mean[told])))
         undone, shown = self.levels.copy(), _rounded(mean)
-        shown[some] = self.in_srgb(_summed(kernel, rings))
+        shown[some] = self.in_srgb(_through(light, kernel, some))
         if self.is_halved:
             shown = halved(shown)
-        undone[some] = mean[some] + self._residual(shown[some], steps, some)
-        return Found(kernel, error, without, _image(shown), _image(undone))
+        undone[some] = mean[some] + self._residual(shown[some], self._steps(fine, some), some)
+        return Found(kernel, every * error, every * without, _image(shown), _image(undone))
 
     def _kernel(self, rings: list[Floats], steps: Floats, some: tuple[Ints, ...]) -> tuple[Kernel, float]:
         """Return the kernel for some pixels, and the squared error with it."""
@@ -210,7 +217,7 @@ class Seen:
 
         ``fine``: in [0, 1], in the light in which colours were mixed, (SCALE height, SCALE width, channel).
         """
-        return _summed(kernel, _rings(_levels(fine), *some))
+        return _through(_levels(fine), kernel, some)
 
     def in_light(self, levels: Floats) -> Floats:
         """Return whole levels in the light in which colours were mixed."""
@@ -281,10 +288,32 @@ def _squared(difference: Floats) -> float:
     return float(np.square(difference, dtype=np.float64).sum())
 
 
+def _through(fine: Floats, kernel: Kernel, some: tuple[Ints, ...]) -> Floats:
+    """Return some pixels of a sharp image through a kernel, shape (pixel, channel)."""
+    return np.concatenate([_summed(kernel, _strip_rings(fine, *part)) for part in _strips(*some)])
+
+
 def _rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
     """Return the sum of the samples of each of RINGS around some pixels, shape (pixel, channel)."""
+    strips = [_strip_rings(fine, *part) for part in _strips(rows, columns)]
+    return [np.concatenate(ring) for ring in zip(*strips, strict=True)]
+
+
+def _strips(rows: Ints, columns: Ints) -> list[tuple[Ints, Ints]]:
+    """Return pixels, in the order of their rows, by strips."""
+    ends = np.searchsorted(rows, np.arange(STRIP, int(rows[-1]) + 1 if len(rows) else 0, STRIP))
+    return list(zip(np.split(rows, ends), np.split(columns, ends), strict=True))
+
+
+def _strip_rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
+    """Return the same for pixels of a strip."""
+    if not len(rows):
+        return [fine[:0, 0]] * len(RINGS)
     before, width = RADIUS - SCALE // 2, fine.shape[1] // SCALE
-    wide = np.pad(fine, [(before, before), (before, before), (0, 0)], mode="edge")
+    first = int(rows[0])
+    top, bottom = SCALE * first - before, SCALE * (int(rows[-1]) + 1) + before
+    beyond = max(-top, 0), max(bottom - len(fine), 0)
+    wide = np.pad(fine[max(top, 0) : bottom], [beyond, (before, before), (0, 0)], mode="edge")
     pairs = [(RADIUS - 1 - away, RADIUS + away) for away in range(RADIUS)]
     last = SCALE * (width - 1) + 1
     sums = [
@@ -294,7 +323,7 @@ def _rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
 
     def both(across: int, down: int) -> Floats:
         """Return the sum of the four samples that are so far away along the two sides."""
-        low, high = ((SCALE * rows + at) * width + columns for at in pairs[down])
+        low, high = ((SCALE * (rows - first) + at) * width + columns for at in pairs[down])
         return sums[across].take(low, axis=0) + sums[across].take(high, axis=0)
 
     return [both(a, b) if a == b else both(a, b) + both(b, a) for a, b in RINGS]

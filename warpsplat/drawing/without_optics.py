@@ -66,25 +66,42 @@ def without_optics(
         ``pixels`` itself if no optics explain it clearly better than its trace does.
     """
     seen = Seen.of(pixels if halved is None else halved, noise)
+    first = pixels, trace(pixels)
+    if not (seen.edges.has_rings or seen.edges.is_linear):
+        box = _busiest(seen.uneven)
+        part, some = seen.part(box), pixels[box.slices()]
+        found = part.find(*(show(scene) for scene in part.scenes(first[1].scene, box)))
+        if found.error >= LIKELY * found.without:
+            return first
+        # Of a large picture, a part tells in less time whether there is a kernel.
+        is_large = pixels.size > 4 * some.size
+        if is_large and _undone(part, (some, trace(some)), trace, show, over, 1)[0] is some:
+            return first
+    return _undone(seen, first, trace, show, over)
+
+
+def _undone(
+    seen: Seen,
+    first: tuple[FloatArray, Traced],
+    trace: Callable[[FloatArray], Traced],
+    show: Callable[[Scene], FloatArray],
+    over: Callable[[], bool],
+    turns: int = TURNS,
+) -> tuple[FloatArray, Traced]:
+    """Return pixels without the optics of a picture, and their trace; the ``first`` if that is not better."""
 
     def look(traced: Traced) -> tuple[Found, float]:
         """Return the optics of the trace, and what its error and its size cost with them [dB]."""
         found = seen.find(*(show(scene) for scene in seen.scenes(traced.scene)))
         return found, _cost(found.error, traced.scene)
 
-    first = best = pixels, trace(pixels)
-    told = seen.edges.has_rings or seen.edges.is_linear
-    if not told:
-        part = _busiest(seen.uneven)
-        found = seen.part(part).find(*(show(scene) for scene in seen.scenes(first[1].scene, part)))
-        if found.error >= LIKELY * found.without:
-            return best
     if over():
-        return best
+        return first
+    best = first
     found, _ = look(first[1])
     usual = _cost(found.without, first[1].scene)
     bound = usual + 10 * float(log10(CLEARLY))
-    if told:
+    if seen.edges.has_rings or seen.edges.is_linear:
         plain = seen.plain()
         traced = trace(plain)
         found, cost = look(traced)
@@ -92,7 +109,7 @@ def without_optics(
             if cost > usual + 10 * float(log10(MOVED)):
                 return first
             bound, best = cost, (plain, traced)
-    for _ in range(TURNS):
+    for _ in range(turns):
         if over():
             break
         current = seen.plain(found.undone)

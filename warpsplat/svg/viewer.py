@@ -145,7 +145,10 @@ LIMIT_SIGNALS = (9, 24)
 
 def on_white(image: Image.Image) -> Pixels:
     """Return RGB in [0, 255], shape (height, width, 3), transparency composited on white."""
-    rgba = np.asarray(image.convert("RGBA")).astype(np.float64)
+    image = image.convert("RGBA")
+    if image.getchannel("A").getextrema() == (255, 255):
+        return np.asarray(image.convert("RGB")).astype(np.float64)
+    rgba = np.asarray(image).astype(np.float64)
     alpha = rgba[..., 3:] / 255.0
     return np.asarray(rgba[..., :3] * alpha + 255.0 * (1.0 - alpha))
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
 from warpsplat.drawing.trace.fewer import _merge, fewer_regions
-from warpsplat.drawing.trace.grids import components
+from warpsplat.drawing.trace.grids import components, nearest_in, nearest_of
 from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import find_partition
@@ -22,6 +22,14 @@ from warpsplat.scene import FloatArray
 def colors_of(found: Regions) -> set[tuple[int, ...]]:
     """Colours of the regions, with their opacity."""
     return {tuple(np.round(found.colorings[p].color).astype(int).tolist()) for p in found.paint.tolist()}
+
+
+def test_the_nearest_pixel_of_a_mask() -> None:
+    mask = np.random.default_rng(2).random((30, 40)) < 0.02
+    mask[:6] = mask[:, :9] = False
+    rows, columns = np.array([2, 20, 29, 11]), np.array([39, 1, 30, 11])
+    np.testing.assert_array_equal(nearest_of(mask, rows, columns), nearest_in(mask)[rows, columns])
+    assert not len(nearest_of(mask, rows[:0], columns[:0]))
 
 
 def test_an_edge_pixel_belongs_to_the_region_with_most_coverage() -> None:

@@ -34,6 +34,10 @@ class Box(NamedTuple):
         """Return what an array is indexed with to get these pixels."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
+    def grown(self, by: int) -> Box:
+        """Return it with so many pixels more on each side, of an image that begins at 0."""
+        return Box(max(self.left - by, 0), max(self.top - by, 0), self.right + by, self.bottom + by)
+
 
 def bounding_boxes(labels: Ints, count: int) -> list[Box]:
     """Return the box around the pixels of each label from 0 to ``count`` - 1; all are there.
@@ -185,6 +189,19 @@ def nearest_in(mask: Bools) -> Ints:
     source = np.zeros(int(labels.max()) + 1, np.int64)
     source[labels[mask]] = np.flatnonzero(mask)
     return np.asarray(source[labels])
+
+
+def nearest_of(mask: Bools, rows: Ints, columns: Ints) -> Ints:
+    """Return the flat index of the pixel of a mask that is nearest to each of some pixels, shape (pixel,)."""
+    if not len(rows):
+        return np.zeros(0, np.int64)
+    at = zip(np.nonzero(mask), (rows, columns), strict=True)
+    (top, bottom), (left, right) = (
+        (int(min(own.min(), asked.min())), int(max(own.max(), asked.max())) + 1) for own, asked in at
+    )
+    nearest = nearest_in(mask[top:bottom, left:right])[rows - top, columns - left]
+    row, column = np.divmod(nearest, right - left)
+    return np.asarray((row + top) * mask.shape[1] + column + left)
 
 
 def unchecked() -> None:

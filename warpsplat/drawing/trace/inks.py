@@ -12,6 +12,7 @@ from warpsplat.drawing.trace.grids import (
     Bools,
     Floats,
     Ints,
+    bounding_boxes,
     channel_max,
     components,
     dilated,
@@ -42,13 +43,17 @@ def with_inks(regions: Regions) -> Regions:
     solid = sorted(set(flat) & _solid(regions, painted))
     if not solid or len(solid) == len(flat):
         return regions
-    bases = {}
-    for k in set(flat) - set(solid):
-        own = painted == k
-        beside = painted[dilated(own, 5) & ~own]
+    bases, numbers = {}, numbers_in(painted)
+    boxes = bounding_boxes(np.searchsorted(numbers, painted), len(numbers))
+    for k, box in zip(numbers.tolist(), boxes, strict=True):
+        if k not in colors or k in solid:
+            continue
+        around = box.grown(2).slices()
+        own = painted[around] == k
+        beside = painted[around][dilated(own, 5) & ~own]
         bases[k] = base = colors[solid[np.bincount(beside, minlength=len(regions.colorings))[solid].argmax()]]
         toward = colors[k] - base
-        pixels = regions.image[own]
+        pixels = regions.image[around][own]
         share = ((pixels - base) * toward).sum(axis=1) / max(float((toward**2).sum()), 1.0)
         off = channel_max(np.abs(pixels - base - share[:, None] * toward))
         # What is more of a colour than the usual one is off by as much more.

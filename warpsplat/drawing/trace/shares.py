@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, nearest_in
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, nearest_of
 from warpsplat.drawing.trace.mixtures import unmix
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.seeds import OUTLIERS, ROUNDING
@@ -94,5 +94,5 @@ def colors_at(regions: Regions, which: Ints, rows: Ints, columns: Ints) -> Float
     for k in numbers_in(which).tolist():
         if regions.colorings[k].ramp is not None:
             own = which == k
-            found[own] = fills[nearest_in(painted == k)[rows[own], columns[own]]]
+            found[own] = fills[nearest_of(painted == k, rows[own], columns[own])]
     return found
