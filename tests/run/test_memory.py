@@ -31,6 +31,7 @@ from warpsplat.run.memory import (
     check_refined,
     factor_for,
     memory_limit,
+    near_edges,
     need,
     need_on_gpu,
 )
@@ -61,7 +62,7 @@ def encoded(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
 @pytest.fixture
 def bare(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only what grows with the image counts, so that a small image can be too large."""
-    for name in ("PROGRAM", "STRIPS", "SHAPE"):
+    for name in ("PROGRAM", "STRIPS", "SHAPE", "DRAWN"):
         monkeypatch.setattr(memory, name, 0)
     monkeypatch.setattr(memory, "LEAST_REDUCED_SIDE", 4)
 
@@ -74,6 +75,24 @@ def test_a_need_grows_with_all_that_takes_memory() -> None:
     options = ("curves", 8000), ("open", True), ("paint", "auto"), ("levels", "8,512"), ("subject", "line")
     for name, value in options:
         assert need(small, make_settings(**{name: value})) > need(small, Settings()), name
+
+
+def test_a_drawing_takes_memory_for_its_edges(bare: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that one of few is not reduced for nothing."""
+    plain, hatched = Image.new("RGB", (64, 48), "white"), Image.new("RGB", (64, 48))
+    plain.paste((0, 0, 200), (20, 20, 30, 30))
+    hatched.putdata([(255 * (x // 3 % 2),) * 3 for _ in range(48) for x in range(64)])
+    counts = [near_edges(image_of(image)) for image in (plain, hatched)]
+    assert 14**2 - 6**2 <= counts[0] <= 15**2 - 5**2 and counts[1] == 64 * 48
+    monkeypatch.setattr(memory, "STRIP_PIXELS", 64 * 16)
+    assert near_edges(image_of(hatched)) == counts[1]
+    facts = image_facts(encoded(plain))
+    limit = need(facts, make_settings(subject="drawing", quality="draft"), edges=counts[0])
+    assert limit < need(facts, make_settings(subject="drawing"), edges=counts[0])
+    settings = make_settings(subject="drawing", quality="draft", max_memory=limit)
+    assert prepare(encoded(plain), settings).reduction is None
+    reduction = prepare(encoded(hatched), settings).reduction
+    assert reduction and need(facts, settings, reduction.factor, edges=counts[1]) <= limit
 
 
 def test_the_size_is_the_largest_within_the_limit() -> None:

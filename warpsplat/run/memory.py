@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from PIL import Image
 
+from warpsplat.drawing.trace.grids import dilated
+from warpsplat.drawing.trace.seeds import EDGE
 from warpsplat.errors import ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
 from warpsplat.files.resolution import resolution_of
@@ -24,7 +26,7 @@ from warpsplat.fit.problem import Fit
 from warpsplat.fit.schedule import phases
 from warpsplat.fit.settings import Settings, solid_color
 from warpsplat.metrics import Rows, Score, score_svg
-from warpsplat.native import machine_memory
+from warpsplat.native import STRIP_PIXELS, machine_memory
 from warpsplat.rendering.memory import SHARE, in_words
 from warpsplat.scene import FloatArray, Kind
 from warpsplat.scene.geometry import enlarged
@@ -49,8 +51,14 @@ SLOTS_A_TILE, SLOTS_BETWEEN, SLOTS_A_SHAPE = 4.0, 9.0, 2.0
 SHAPE = 24 << 10
 """Bytes per shape: its samples, densification, its text."""
 
-TRACED = {"drawing": 420, "line": 420, "silhouette": 420, "pixel": 260}
+TRACED = {"drawing": 120, "line": 420, "silhouette": 420, "pixel": 260}
 """Bytes per pixel of tracing, by subject."""
+
+DRAWN_EDGE = 1000
+"""Bytes per pixel near an edge that tracing a drawing takes besides, and as many that fitting it does."""
+
+DRAWN = 200 << 20
+"""Bytes of fitting any drawing."""
 
 LANES = 1 << 10
 """Bytes per slot that a GPU adds, twice with gradients: those of colours, by lane."""
@@ -76,10 +84,30 @@ LEAST_REDUCED_SIDE = 32
 """Least side of a reduced image [px]."""
 
 
-def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFacts | None = None) -> int:
+def near_edges(image: FloatArray) -> int:
+    """Return the number of pixels of an image, sRGB in [0, 1], near steps of colour that are edges."""
+    count, rows = 0, max(STRIP_PIXELS // image.shape[1], 1)
+    for first in range(0, len(image), rows):
+        strip = image[first : first + rows + 1]
+        down, across = (np.abs(np.diff(strip, axis=axis)).max(axis=2) > EDGE / 255 for axis in (0, 1))
+        is_edge = across[:rows, :]
+        is_edge = np.pad(is_edge, [(0, 0), (0, 1)])
+        is_edge[: len(down)] |= down
+        count += int(dilated(is_edge, 5).sum())
+    return count
+
+
+def need(
+    facts: ImageFacts,
+    settings: Settings,
+    factor: int = 1,
+    mask: ImageFacts | None = None,
+    edges: float = 0,
+) -> int:
     """Estimate the peak of a run [bytes] from above: for photographs within a quarter.
 
-    ``factor``: how many times smaller the image is read, in each direction; ``mask``: facts of a mask.
+    ``factor``: how many times smaller the image is read, in each direction; ``mask``: facts of a mask;
+    ``edges``: pixels near edges of the image itself, as far as is known, if it is a drawing.
     """
     pixels = facts.width * facts.height
     worked = pixels / factor**2
@@ -87,6 +115,9 @@ def need(facts: ImageFacts, settings: Settings, factor: int = 1, mask: ImageFact
     reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
     traced = TRACED.get(settings.subject)
     working = traced * worked if traced else _fitting(facts, settings, factor)
+    if settings.subject == "drawing":
+        stages = 1 + settings.tidy
+        working += stages * DRAWN_EDGE * min(edges / factor, worked) + settings.tidy * DRAWN
     cut_out = 64  # bytes per pixel of removing the background of a photograph
     if settings.removal and not traced:
         working = max(working, cut_out * worked)
@@ -216,10 +247,15 @@ class Lack(NamedTuple):
 
 
 def _lack(
-    facts: ImageFacts, settings: Settings, factor: int, mask: ImageFacts | None, gpu: DeviceMemory | None
+    facts: ImageFacts,
+    settings: Settings,
+    factor: int,
+    mask: ImageFacts | None,
+    gpu: DeviceMemory | None,
+    edges: float = 0,
 ) -> Lack | None:
     """Return the memory that is short for a run; None if there is enough."""
-    limit, wanted = memory_limit(settings), need(facts, settings, factor, mask)
+    limit, wanted = memory_limit(settings), need(facts, settings, factor, mask, edges)
     if limit is not None and wanted > limit:
         return Lack(wanted, limit_words(settings, limit))
     if gpu and (wanted := need_on_gpu(facts, settings, factor)) > gpu.limit:
@@ -240,13 +276,14 @@ def factor_for(
     mask: ImageFacts | None = None,
     least: int = 1,
     gpu: DeviceMemory | None = None,
+    edges: float = 0,
 ) -> int:
     """Return how many times an image has to be reduced: a power of two, at least ``least``; see ``need``.
 
     Raises ``ResourceError``, which begins with ``name``, if the limit is too small for any size.
     """
     factor = least
-    while facts and (lack := _lack(facts, settings, factor, mask, gpu)):
+    while facts and (lack := _lack(facts, settings, factor, mask, gpu, edges)):
         factor *= 2
         if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
             raise ResourceError(
@@ -329,9 +366,10 @@ def reduction_for(
     settings: Settings,
     factor: int,
     gpu: DeviceMemory | None = None,
+    edges: float = 0,
 ) -> Reduction | None:
     """Return the reduction of ``source`` to ``target``; None if that has the image's own size."""
-    lack = _lack(facts, settings, 1, mask, gpu) if facts and factor > 1 else None
+    lack = _lack(facts, settings, 1, mask, gpu, edges) if facts and factor > 1 else None
     if facts is None or lack is None:
         return None
     whole, limit = None, memory_limit(settings)

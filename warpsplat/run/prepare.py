@@ -20,7 +20,15 @@ from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import SUBJECTS, Settings, Subject, make_settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.portable.filters import boxed
-from warpsplat.run.memory import DeviceMemory, Reduction, factor_for, facts_of, mask_factor, reduction_for
+from warpsplat.run.memory import (
+    DeviceMemory,
+    Reduction,
+    factor_for,
+    facts_of,
+    mask_factor,
+    near_edges,
+    reduction_for,
+)
 from warpsplat.run.result import job_key
 from warpsplat.run.strategies import choose_strategy
 from warpsplat.scene import FloatArray, Kind, Scene
@@ -91,11 +99,12 @@ def prepare(
     gpu = None
     if backend and choose_strategy(chosen).uses_device:
         gpu = DeviceMemory.of(backend().device)
-    factor = factor_for(facts, chosen, name, mask_facts, first, gpu)
+    edges = first * near_edges(target) if chosen.subject == "drawing" else 0
+    factor = factor_for(facts, chosen, name, mask_facts, first, gpu, edges)
     if factor > first:
         target = boxed(target, factor // first)
     release_memory()
-    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu)
+    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu, edges)
     if is_silhouette:
         target = silhouettes(target, name)
         if facts and factor > 1:
