@@ -70,7 +70,7 @@ def bare(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_need_grows_with_all_that_takes_memory() -> None:
     base = need(HUGE, Settings())
     assert 2 << 30 < base < 4e9
-    assert need(HUGE, Settings(), 2) < base / 1.5 < base < need(replace(HUGE, kept=6), Settings())
+    assert need(HUGE, Settings(), 2) < base / 1.5 < base < need(replace(HUGE, kept=12), Settings())
     small = ImageFacts(1200, 900, 3, 4, drafts=False)
     options = ("curves", 8000), ("open", True), ("paint", "auto"), ("levels", "8,512"), ("subject", "line")
     for name, value in options:

@@ -69,7 +69,7 @@ ON_GPU = 32 << 20
 MASK_READ, MASK = 12, 4
 """Bytes per pixel of a mask: while it is read, and afterwards."""
 
-FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 2, 10, 12
+FILE_PICTURE, HALVES, HALVES_ODD, UNCUT = 4, 6, 14, 12
 """Bytes per pixel of measuring a file: its picture, both images at half size, the same if a side is odd, and
 what a file adds that is not drawn in strips."""
 
