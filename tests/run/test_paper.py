@@ -80,7 +80,7 @@ def test_pixels_that_are_no_squares() -> None:
 def test_images_that_are_processed_smaller_keep_their_size() -> None:
     large = drawing(900, 700, dpi=(254, 254))  # was enlarged by repeating pixels
     assert size(made(large, units="mm")) == ("180mm", "140mm")
-    result = made(large, units="mm", max_memory="700MB")
+    result = made(large, units="mm", max_memory="500MB")
     assert result.reduced
     assert size(result) == ("180mm", "140mm")
 

@@ -57,7 +57,7 @@ TRACED = {"drawing": 120, "line": 420, "silhouette": 420, "pixel": 260}
 DRAWN_EDGE = 1000
 """Bytes per pixel near an edge that tracing a drawing takes besides, and as many that fitting it does."""
 
-DRAWN = 200 << 20
+DRAWN = 128 << 20
 """Bytes of fitting any drawing."""
 
 LANES = 1 << 10
