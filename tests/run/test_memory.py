@@ -83,7 +83,7 @@ def test_a_drawing_takes_memory_for_its_edges(bare: None, monkeypatch: pytest.Mo
     plain.paste((0, 0, 200), (20, 20, 30, 30))
     hatched.putdata([(255 * (x // 3 % 2),) * 3 for _ in range(48) for x in range(64)])
     counts = [near_edges(image_of(image)) for image in (plain, hatched)]
-    assert 14**2 - 6**2 <= counts[0] <= 15**2 - 5**2 and counts[1] == 64 * 48
+    assert counts == [16**2 - 4**2 - 4, 64 * 48], "3 px on each side, but for the corners"
     monkeypatch.setattr(memory, "STRIP_PIXELS", 64 * 16)
     assert near_edges(image_of(hatched)) == counts[1]
     facts = image_facts(encoded(plain))

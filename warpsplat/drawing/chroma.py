@@ -21,8 +21,8 @@ WINDOW = 5
 """Side of the squares in which colours are on a line [px]: some blocks of two by two."""
 
 OUTWARD = 1e-3
-"""What a window counts more for each square of the distance of its middle [levels squared], where several
-have no error."""
+"""Penalty of a window by the square of its middle's distance [levels squared], which decides between those
+without error."""
 
 
 def has_blurred_colors(image: FloatArray) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 
 from warpsplat.drawing.chroma import halved, has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.edges import LINEAR, MIDDLES, Edges, find_edges
-from warpsplat.drawing.trace.grids import Bools, Box, Floats, Ints, channel_max, dilated
+from warpsplat.drawing.trace.grids import Bools, Box, Floats, Ints, dilated, uneven_pixels
 from warpsplat.drawing.trace.seeds import ROUNDING, noise_of
 from warpsplat.portable.linear import solve
 from warpsplat.scene import FloatArray, Scene
@@ -35,14 +35,14 @@ ROUNDS = 4
 """Solutions for a kernel, as each tells which pixels it would clip."""
 
 MOST_TOLD = 1 << 17
-"""Pixels that tell the kernel, which bounds time and memory."""
+"""Most pixels from which the kernel is solved for, which bounds time and memory."""
 
 STRIP = 64
-"""Rows of pixels that are looked at together, which bounds the memory."""
+"""Rows whose samples are summed together, which bounds the memory."""
 
 RIDGE = 0.01
-"""What the mean of the diagonal counts besides in the normal equations: edges of few directions leave weights
-open, which stay small then."""
+"""Ridge of the normal equations, over the mean of their diagonal: edges of few directions leave weights open,
+which stay small then."""
 
 CLEAN = 16
 """Weight of clean edges: elsewhere, what a trace does not tell is taken for blur."""
@@ -104,7 +104,7 @@ class Seen:
         noise = noise_of(levels) if noise is None else noise
         is_halved = has_blurred_colors(image)
         sharp = _levels(with_sharp_colors(image)) if is_halved else levels
-        edges, uneven = find_edges(sharp, noise), _uneven(levels, ROUNDING + noise)
+        edges, uneven = find_edges(sharp, noise), uneven_pixels(levels, ROUNDING + noise)
         return cls(levels, uneven, edges, noise, is_halved)
 
     def part(self, box: Box) -> Seen:
@@ -137,7 +137,7 @@ class Seen:
         """
         fine = _levels(fine)
         mean = reduce(np.add, [fine[y::SCALE, x::SCALE] for y, x in np.ndindex(SCALE, SCALE)]) / COUNTS[0]
-        beside = dilated(self.uneven | _uneven(fine, 0)[::SCALE, ::SCALE], 2 * RADIUS // SCALE)
+        beside = dilated(self.uneven | uneven_pixels(fine, 0)[::SCALE, ::SCALE], 2 * RADIUS // SCALE)
         some = np.nonzero(beside)
         light = fine if light is None else _levels(light)
         every = max(-(-len(some[0]) // MOST_TOLD), 1)
@@ -261,17 +261,6 @@ def _image(levels: Floats) -> FloatArray:
     return np.asarray(levels / np.float32(255), np.float32)
 
 
-def _uneven(image: Floats, tolerance: float) -> Bools:
-    """Return the pixels that differ from one beside them by more than a tolerance, shape (height, width)."""
-    uneven = np.zeros(image.shape[:2], np.bool_)
-    across, down = (channel_max(np.abs(np.diff(image, axis=axis))) > tolerance for axis in (1, 0))
-    uneven[:, 1:] |= across
-    uneven[:, :-1] |= across
-    uneven[1:] |= down
-    uneven[:-1] |= down
-    return uneven
-
-
 def _summed(kernel: Kernel, rings: list[Floats]) -> Floats:
     """Return the sum of rings by their weights."""
     total = np.zeros_like(rings[0])
@@ -300,13 +289,13 @@ def _rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
 
 
 def _strips(rows: Ints, columns: Ints) -> list[tuple[Ints, Ints]]:
-    """Return pixels, in the order of their rows, by strips."""
+    """Return pixels, whose rows are in order, by strips."""
     ends = np.searchsorted(rows, np.arange(STRIP, int(rows[-1]) + 1 if len(rows) else 0, STRIP))
     return list(zip(np.split(rows, ends), np.split(columns, ends), strict=True))
 
 
 def _strip_rings(fine: Floats, rows: Ints, columns: Ints) -> list[Floats]:
-    """Return the same for pixels of a strip."""
+    """Return what ``_rings`` does, for pixels of one strip."""
     if not len(rows):
         return [fine[:0, 0]] * len(RINGS)
     before, width = RADIUS - SCALE // 2, fine.shape[1] // SCALE

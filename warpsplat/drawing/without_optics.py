@@ -71,7 +71,7 @@ def without_optics(
         box = _busiest(seen.uneven)
         part, some = seen.part(box), pixels[box.slices()]
         found = part.find(*(show(scene) for scene in part.scenes(first[1].scene, box)))
-        if found.error >= LIKELY * found.without:
+        if found.error >= LIKELY * found.without or over():
             return first
         # Of a large picture, a part tells in less time whether there is a kernel.
         is_large = pixels.size > 4 * some.size

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from PIL import Image
 
-from warpsplat.drawing.trace.grids import dilated
+from warpsplat.drawing.trace.grids import dilated, uneven_pixels
 from warpsplat.drawing.trace.seeds import EDGE
 from warpsplat.errors import ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
@@ -86,15 +86,9 @@ LEAST_REDUCED_SIDE = 32
 
 def near_edges(image: FloatArray) -> int:
     """Return the number of pixels of an image, sRGB in [0, 1], near steps of colour that are edges."""
-    count, rows = 0, max(STRIP_PIXELS // image.shape[1], 1)
-    for first in range(0, len(image), rows):
-        strip = image[first : first + rows + 1]
-        down, across = (np.abs(np.diff(strip, axis=axis)).max(axis=2) > EDGE / 255 for axis in (0, 1))
-        is_edge = across[:rows, :]
-        is_edge = np.pad(is_edge, [(0, 0), (0, 1)])
-        is_edge[: len(down)] |= down
-        count += int(dilated(is_edge, 5).sum())
-    return count
+    rows = max(STRIP_PIXELS // image.shape[1], 1)
+    strips = (image[first : first + rows] for first in range(0, len(image), rows))
+    return sum(int(dilated(uneven_pixels(strip, EDGE / 255), 5).sum()) for strip in strips)
 
 
 def need(

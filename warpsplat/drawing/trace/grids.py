@@ -66,6 +66,20 @@ def depth(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     return filters.distance(np.pad(mask, 1))[1:-1, 1:-1]
 
 
+def uneven_pixels(image: Floats, tolerance: float) -> Bools:
+    """Return the pixels that differ from one beside them by more than a tolerance, shape (height, width).
+
+    ``image``: shape (height, width, channel).
+    """
+    uneven = np.zeros(image.shape[:2], np.bool_)
+    across, down = (channel_max(np.abs(np.diff(image, axis=axis))) > tolerance for axis in (1, 0))
+    uneven[:, 1:] |= across
+    uneven[:, :-1] |= across
+    uneven[1:] |= down
+    uneven[:-1] |= down
+    return uneven
+
+
 def dilated(mask: npt.NDArray[Any], side: int) -> Bools:
     """Return the pixels within a square of ``side`` px around those of a mask."""
     return np.asarray(cv2.dilate(np.asarray(mask, np.uint8), np.ones((side, side), np.uint8)) > 0)
