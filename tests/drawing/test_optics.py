@@ -99,6 +99,7 @@ def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late:
 def test_a_part_of_a_large_picture_tells_whether_there_is_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     """A blur is undone in it; a shape that its trace does not explain, as a fine checkerboard, is no blur."""
     monkeypatch.setattr(without_optics_module, "LOOK", 40)
+    monkeypatch.setattr(without_optics_module, "PARTS", 4)
     blurred = pixels(MADE["blurred"]())
     result, _ = without_optics(blurred, None, trace, show, bool)
     assert decibels(result, pixels(small(BOX))) > decibels(blurred, pixels(small(BOX))) + 4

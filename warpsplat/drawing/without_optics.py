@@ -24,6 +24,9 @@ TURNS = 6
 LOOK = 128
 """Side of the part of a picture that is looked at first [px]."""
 
+PARTS = 16
+"""Such parts in a picture that is so large that one of them decides whether there is a kernel."""
+
 LIKELY, CLEARLY = 0.9, 0.75
 """Share of the squared error without a kernel that one must leave less than for a trace through it to be
 tried, and for that to be kept, of files of one size: blurred pictures have .5 and less."""
@@ -74,7 +77,7 @@ def without_optics(
         if found.error >= LIKELY * found.without or over():
             return first
         # Of a large picture, a part tells in less time whether there is a kernel.
-        is_large = pixels.size > 4 * some.size
+        is_large = pixels.size > PARTS * some.size
         if is_large and _undone(part, (some, trace(some)), trace, show, over, 1)[0] is some:
             return first
     return _undone(seen, first, trace, show, over)
