@@ -18,7 +18,7 @@ from PIL import Image
 import warpsplat
 from tests import ROOT
 from tests.drawing.drawings import vectorized
-from tests.drawing.trace.drawings import LOGO, draw
+from tests.drawing.trace.drawings import LOGO, draw, ground
 from tests.runs import scored
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.draft import byte_price
@@ -184,13 +184,21 @@ def test_warp_is_not_imported(tmp_path: Path, subject: str) -> None:
     assert (tmp_path / "a.svg").read_text().startswith("<svg")
 
 
+DOTS = ground("#fff") + "".join(
+    f'<circle cx="{x}" cy="{x}" r="{radius}" fill="{color}"/>'
+    for x, radius, color in ((38, 30, "#2457a8"), (80, 9, "#ee4266"), (10, 4, "#187a3c"))
+)
+"""Three dots, each of which shows less than the one before it."""
+
+
 def test_figures_few_bytes_few_colours_and_few_rows() -> None:
     whole = draft(draw(LOGO), subject="drawing")
     found = whole.as_dict()
     assert found["psnr"] > 33
     assert (found["render_psnr"], found["estimated_psnr"], found["iterations"]) == (None, None, 0)
-    most = scored(whole).bytes - 60
-    small = draft(draw(LOGO), subject="drawing", max_bytes=most)
+    whole = draft(draw(DOTS), subject="drawing")
+    most = scored(whole).bytes - 30
+    small = draft(draw(DOTS), subject="drawing", max_bytes=most)
     assert len(whole.scene) > len(small.scene) > 1
     assert scored(small).bytes <= most
     colors = draft(draw(LOGO), subject="drawing", palette="#2457a8,#ffffff").scene.colors

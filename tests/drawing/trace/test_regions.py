@@ -10,7 +10,6 @@ import pytest
 from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
 from warpsplat.drawing.trace.fewer import _merge, fewer_regions
 from warpsplat.drawing.trace.grids import components, nearest_in, nearest_of
-from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions, find_regions
@@ -188,16 +187,6 @@ def test_regions_of_random_maps_keep_the_areas_of_each_pixel(seed: int) -> None:
     assert own.min() > 0.4 and own.mean() > 0.6
 
 
-def stroke(ink: float, shown: float) -> Regions:
-    """A bar of 24x5 px that is taken for one of a darker ink than its pixels show."""
-    labels = np.zeros((16, 32), np.int32)
-    labels[5:10, 4:28] = 1
-    paper, *inks = (np.array([v, v, v, 255], np.float32) for v in (255, ink, shown))
-    fills, image = (np.where(labels[..., None] == 1, each, paper) for each in inks)
-    colorings = [Coloring(paper), Coloring(inks[0])]
-    return Regions(image, labels, fills, np.arange(2, dtype=np.int32), colorings, 0.0)
-
-
 BROWN, BLUE = (120, 80, 40), (60, 110, 160)
 
 
@@ -211,7 +200,7 @@ def drawn(*lines: tuple[str, tuple[int, int, int]]) -> FloatArray:
 
 def inks_of(image: FloatArray) -> FloatArray:
     """Return the colours of an image's pixels if they were covered."""
-    return with_inks(find_regions(levels(image))).fills
+    return find_regions(levels(image)).fills
 
 
 def test_lines_that_touch_keep_their_colours() -> None:
@@ -230,3 +219,15 @@ def test_lines_of_one_colour_have_one_ink(color: tuple[int, int, int]) -> None:
     _, *inks = sorted(np.unique(fills.reshape(-1, 4), axis=0).tolist(), reverse=True)
     assert len(inks) == 1
     assert np.abs(np.array(inks[0][:3]) - color).max() < 32
+
+
+def test_a_faint_line_across_several_colours_has_its_ink() -> None:
+    """No pixel is of the ink alone: on each bar it is the one that all its mixtures point to."""
+    bars = "".join(
+        f'<rect x="{x}" width="16" height="64" fill="{color}"/>'
+        for x, color in ((8, "#264653"), (32, "#2a9d8f"), (56, "#e76f51"))
+    )
+    body = ground("#fff", 80, 64) + bars + '<rect y="31.75" width="80" height=".75" fill="#ccc"/>'
+    fills = find_regions(levels(draw_exactly(body, 80, 64))).fills
+    on_line = np.abs(fills[32] - [204, 204, 204, 255]).max(axis=1) < 16
+    assert on_line[[2, 3, 14, 15, 16, 38, 39, 40, 63, 64, 65, 76, 77]].all()

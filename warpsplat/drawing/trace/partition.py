@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, components, dilated
-from warpsplat.drawing.trace.inks import with_inks
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.shares import Shares, beside_borders, colors_at, find_shares
@@ -27,7 +26,7 @@ FINEST = 4
 MOST_CELLS = 1 << 20
 """Cells of a grid finer than the pixels, which bounds time and memory."""
 
-MOST_DOUBT = 0.1
+MOST_DOUBT = 0.5
 """How far off boundaries may be on such a grid [cell]: what is finer shows noise."""
 
 STEPS, RATE = 16, 0.3
@@ -62,7 +61,6 @@ class Partition:
 
 def find_partition(regions: Regions) -> Partition:
     """Return regions with boundaries between and within the pixels of their image."""
-    regions = with_inks(regions)
     shares = find_shares(regions)
     at_border = beside_borders(shares.first) | (shares.share < 1)
     doubt = _usual(shares, at_border)
