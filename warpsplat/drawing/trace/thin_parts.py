@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
-from warpsplat.drawing.trace.mixtures import MIXED, RESIDUAL_WEIGHT, mixed, unmix
+from warpsplat.drawing.trace.mixtures import MIXED, mixed, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts, least_worth
 from warpsplat.portable import filters
 
@@ -18,6 +18,7 @@ ALONG = 5  # [px] side of the square in which these are compared
 STEP = 16  # [levels] between colours that are told apart
 TRIED = 32  # colours of pixels, and pairs of these and what is beside, from which inks are sought
 PARALLEL = 0.01  # squared sine of the angle below which two mixtures do not tell where they meet
+WITHIN = 0.03  # what a squared error within the limit counts for, over one beyond it
 EQUAL = 0.25  # of the limit: mixtures that are less off are as good as exact
 SAMPLES, BLOCK = 1 << 16, 32  # pixels by which inks are judged, about, in blocks of so many along a side
 
@@ -140,8 +141,8 @@ class _Explanations:
             left = np.minimum(left, errors[best])
 
     def _visible(self, off: Floats) -> Floats:
-        """Return the squared errors of mixtures that are ``off``, almost none within the limit."""
-        return np.square(np.maximum(off - self.limit, 0)) + RESIDUAL_WEIGHT * np.square(off)
+        """Return the squared errors of mixtures that are ``off``, which count for little within the limit."""
+        return np.square(np.maximum(off - self.limit, 0)) + WITHIN * np.square(off)
 
     def best(self, thin: _ThinParts, inks: dict[int, Floats], least: float) -> Ints:
         """Return the number of the ink of each pixel; NO_REGION where none covers enough of it.
