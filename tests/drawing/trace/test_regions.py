@@ -231,3 +231,14 @@ def test_a_faint_line_across_several_colours_has_its_ink() -> None:
     fills = find_regions(levels(draw_exactly(body, 80, 64))).fills
     on_line = np.abs(fills[32] - [204, 204, 204, 255]).max(axis=1) < 16
     assert on_line[[2, 3, 14, 15, 16, 38, 39, 40, 63, 64, 65, 76, 77]].all()
+
+
+def test_specks_on_gradients_alone_have_no_ink() -> None:
+    """There is no flat colour at all, and a speck is worth none."""
+    x = np.linspace(0, 1, 96, dtype=np.float32)[None, :, None]
+    image = np.repeat((1 - x) * [0.9, 0.2, 0.1] + x * [0.1, 0.3, 0.8], 96, axis=0).astype(np.float32)
+    plain = find_regions(levels(image))
+    image[40, 40] += 0.12
+    found = find_regions(levels(image))
+    assert all(coloring.ramp is not None for coloring in plain.colorings)
+    assert len(found.paint) == len(plain.paint)

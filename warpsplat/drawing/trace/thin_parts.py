@@ -56,6 +56,8 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
     for color in new:
         inks[len(colorings)] = color
         colorings.append(Coloring(color))
+    if not inks:
+        return parts
     ink = find.best(thin, inks, least)
     labels, fills, paint = parts.labels.copy(), parts.fills.copy(), parts.paint.tolist()
     for k in np.unique(ink[ink != NO_REGION]).tolist():
@@ -171,6 +173,8 @@ class _Explanations:
                 share, off = self.explain(thin, list(inks.values())[i])
                 own = chosen == i
                 if revised:
+                    if np.maximum(error - off * off, 0).sum() <= least:
+                        continue
                     better = ~own & (self._along(thin, error) > self._along(thin, off * off))
                     count, piece, _ = self._components(thin, better)
                     own = better & (np.bincount(piece, better * (error - off * off), count) > least)[piece]
