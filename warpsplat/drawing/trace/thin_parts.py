@@ -90,7 +90,7 @@ class _ThinParts:
 
 @dataclass(frozen=True)
 class _Explanations:
-    """What inks explain of thin parts: each pixel as a mixture of an ink and what is beside."""
+    """Inks as explanations of thin parts: each pixel is a mixture of an ink and what is beside it."""
 
     main: Floats
     """The main colour of the image, which may be mixed with an ink wherever it is, if nothing else is."""
