@@ -125,7 +125,11 @@ class _Explanations:
         for ink in known:
             left = np.minimum(left, self._visible(self.explain(some, ink)[1]))
         tried = _candidates(some, self.limit)
-        errors = [self._visible(self.explain(some, ink)[1]).astype(np.float32) for ink in tried]
+        errors, inexact = list[Floats](), list[float]()
+        for ink in tried:
+            off = self.explain(some, ink)[1]
+            errors.append(self._visible(off).astype(np.float32))
+            inexact.append(float(np.square(np.minimum(off, self.limit)).sum()))
         found = list[Floats]()
         pixels = int(self.shape[0] * self.shape[1] * part)
         # What no ink explains is an error that remains in any case.
@@ -135,10 +139,14 @@ class _Explanations:
             least = least_worth(regions + len(found), pixels, spread)
             # A part for which an ink explains less than a region is worth does not count.
             gains = [np.bincount(owner, np.maximum(left - error, 0), count) for error in errors]
-            totals = [float(np.maximum(gain - least, 0).sum()) for gain in gains]
-            best = int(np.argmax(totals))
+            totals = np.array([np.maximum(gain - least, 0).sum() for gain in gains])
+            best = int(totals.argmax())
             if totals[best] <= 0:
                 return found, least / part
+            # Of those that explain as much, but for less than the worth of a region, the most exact one is the ink.
+            close = np.flatnonzero(totals >= totals[best] - least).tolist()
+            as_good = [i for i in close if np.maximum(errors[i] - errors[best], 0).sum() <= least]
+            best = min(as_good, key=inexact.__getitem__)
             found.append(tried[best])
             left = np.minimum(left, errors[best])
 
