@@ -248,11 +248,12 @@ def test_specks_on_gradients_alone_have_no_ink() -> None:
 @pytest.mark.parametrize("seed", [0, 3, 8])
 @pytest.mark.parametrize("is_negative", [False, True], ids=["as it is", "negative"])
 def test_a_grid_on_a_chart_has_its_ink(seed: int, is_negative: bool) -> None:
-    """Where lines cross one another or bars, other inks explain a little more, but are less exact elsewhere."""
+    """Where lines cross one another, other inks explain a little more, but are less exact elsewhere."""
     quarters = functools.partial(np.random.default_rng(seed).integers, 0, 4)
     rows = np.random.default_rng(seed).integers(5, 60, 4).tolist()
     bars = "".join(
-        f'<rect x="{10 + 20 * i + quarters() / 4}" y="{row}" width="{12 + quarters() / 4}" height="90" fill="{color}"/>'
+        f'<rect x="{10 + 20 * i + quarters() / 4}" y="{row}" width="{12 + quarters() / 4}" height="90"'
+        f' fill="{color}"/>'
         for i, (row, color) in enumerate(zip(rows, ("#264653", "#2a9d8f", "#e9c46a", "#e76f51"), strict=True))
     )
     grid = "".join(

@@ -143,7 +143,7 @@ class _Explanations:
             best = int(totals.argmax())
             if totals[best] <= 0:
                 return found, least / part
-            # Of those that explain as much, but for less than the worth of a region, the most exact one is the ink.
+            # Of those that explain as much, but for the worth of a region, the most exact one is the ink.
             close = np.flatnonzero(totals >= totals[best] - least).tolist()
             as_good = [i for i in close if np.maximum(errors[i] - errors[best], 0).sum() <= least]
             best = min(as_good, key=inexact.__getitem__)
