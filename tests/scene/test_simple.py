@@ -65,6 +65,22 @@ def test_crossing_contours_are_cut_and_look_the_same(seed: int, rule: str) -> No
     assert np.abs(pixels(made) - pixels(scene)).mean() < 0.001
 
 
+@pytest.mark.parametrize("rule", ["nonzero", "evenodd"])
+def test_contours_that_cross_in_nodes_look_the_same(rule: str) -> None:
+    """Where one cuts into another in a node that both have, it comes out again across an edge."""
+    for seed in range(40):
+        random, rings = np.random.default_rng(seed), []
+        shared = random.integers(4, 2 * SIDE - 4, (4, 2)) / 2
+        for _ in range(3):
+            corners = np.concatenate([shared, random.integers(4, 2 * SIDE - 4, (3, 2)) / 2])
+            corners = corners[random.choice(len(corners), 5, replace=False)]
+            # Around their mean, so that they do not cross themselves.
+            around = np.arctan2(*(corners - corners.mean(axis=0)).T)
+            rings.append("M" + "L".join(f"{x} {y}" for x, y in corners[np.argsort(around)].tolist()) + "z")
+        scene = scene_of(f'd="{"".join(rings)}" fill-rule="{rule}"')
+        assert np.abs(pixels(simple(scene, 16)) - pixels(scene)).mean() < 0.002, seed
+
+
 def test_simple_contours_stay() -> None:
     scene = scene_of('d="M9 9h40v40h-40zM19 19v20h20v-20z"', f'd="{random_path(3)}" fill="none" stroke="red"')
     assert simple(scene, 16) is scene

@@ -127,8 +127,13 @@ def merged(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
 
     Arguments as for ``simple_rings``.
     """
+    return joined(_grown(rings), painted, least)
+
+
+def _grown(rings: list[Floats]) -> list[Floats]:
+    """Return rings and, beside them, what is a little to their left, (cubic, 4, 4), as for ``uncrossed``."""
     grown = (moved_left(ring, GROWN * (1 + i * 0.618 % 1)) for i, ring in enumerate(rings))
-    return joined([np.concatenate(both, axis=2) for both in zip(rings, grown, strict=True)], painted, least)
+    return [np.concatenate(both, axis=2) for both in zip(rings, grown, strict=True)]
 
 
 def joined(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
@@ -162,14 +167,30 @@ def uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]]:
     following[first[1:] - 1] = first[:-1]
     pairs, places = intersections(cubics[..., -2:])
     crossed = np.isin(np.arange(len(rings)), owner[pairs])
+    if cubics.shape[2] == 2:
+        crossed |= _meeting_twice(cubics, owner)
     touching = np.array([len(set(map(tuple, ring[:, 0, :2].tolist()))) < len(ring) for ring in rings])
     if not (crossed | touching).any():
         return rings, []
     new = [ring for ring, is_new in zip(rings, touching & ~crossed, strict=True) if is_new]
-    if len(pairs):
+    if crossed.any() and cubics.shape[2] == 2:
+        # They may cross in their nodes as well, or along an edge: between these, where they are grown.
+        crossing = [ring for ring, is_new in zip(rings, crossed, strict=True) if is_new]
+        new += [ring[..., :2] for part in uncrossed(_grown(crossing)) for ring in part]
+    elif len(pairs):
         new += _joined(cubics, following, owner, pairs, places)
     kept = [ring for ring, is_new in zip(rings, crossed | touching, strict=True) if not is_new]
     return kept, [part for ring in new for part in _apart(ring)]
+
+
+def _meeting_twice(cubics: Floats, owner: IndexArray) -> npt.NDArray[np.bool_]:
+    """Return which rings have two nodes in common with another one, in which they may cross, (ring,)."""
+    count = int(owner[-1]) + 1
+    order = np.lexsort((owner, *cubics[:, 0].T))
+    is_same = (cubics[order[1:], 0] == cubics[order[:-1], 0]).all(axis=1)
+    pairs = owner[np.stack([order[:-1], order[1:]])[:, is_same]]
+    pairs, times = np.unique(pairs[:, pairs[0] != pairs[1]], axis=1, return_counts=True)
+    return np.isin(np.arange(count), pairs[:, times > 1])
 
 
 def _joined(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import LOGO, STAR, decibels, draw, ground, photograph
+from warpsplat.drawing.trace.hidden import Cover, hidden_path
 from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.metrics import psnr
@@ -232,3 +233,19 @@ def test_a_slope_and_a_map_have_no_noise_but_grain_is() -> None:
     opacity = rng.normal(128, 6, (80, 80, 1)).astype(np.float32)
     assert noise_of(np.repeat(opacity, 4, axis=2)) < 0.01  # white, not seen on white
     assert noise_of(np.concatenate([np.repeat(opacity / 2, 3, axis=2), opacity], axis=2)) > 1
+
+
+def test_a_thin_line_that_begins_at_a_margin_is_under_its_cover() -> None:
+    """From one side of it to the other, the shortest hidden way at the margin would leave all of it out."""
+    ranks = np.ones((20, 20), np.int32)
+    ranks[10, :15] = 0
+    right, left = [[1, 0]] * 15, [[-1, 0]] * 15
+    steps = np.array([*right, [0, 1], *left])
+    begins = np.cumsum([[0, 10], *steps[:-1]], axis=0)
+    cover = Cover(ranks)
+    middles = cover.middles(np.zeros(len(steps), np.int32), begins, steps, steps.astype(np.float64))
+    ends = np.array([[0.0, 10.0], [0.0, 11.0]])
+    goals = np.concatenate([ends[:1], middles, ends[1:]])
+    path = hidden_path(cover, 0, False, goals, np.concatenate([begins, begins[-1:], begins[-1:]]))
+    outline = np.concatenate([ends[:1], path, ends[1:]]).astype(np.float32)
+    assert all(cv2.pointPolygonTest(outline, (x + 0.5, 10.5), False) > 0 for x in range(15))

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, eroded
 from warpsplat.portable.elementary import hypot
+from warpsplat.scene.simple import area
 
 NEAREST, DEEPEST = 0.5, 16.0
 """How far beyond its boundary what hides a region is measured: first, which is the step as well, and at the
@@ -93,6 +94,9 @@ def hidden_path(cover: Cover, rank: int, has_holes: bool, goals: Floats, vertice
 
     def is_free(low: int, high: int) -> bool:
         polygon = np.concatenate([vertices[low : high + 1], goals[[high, low]]])
+        # The region is to the right of its boundary, and no way that leaves out a pixel of it is one.
+        if area(polygon) > 1:
+            return False
         return cover.hides_line(rank, goals[low], goals[high]) and cover.hides_polygon(below, polygon)
 
     last, corners = len(goals) - 1, [0]
