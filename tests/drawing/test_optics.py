@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -73,6 +74,15 @@ def drawn(image: FloatArray, times: int = 1, **given: str) -> FloatArray:
 
 def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
+
+
+def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stairs, as pictures made small without a filter have, may look as if colours were mixed in linear light."""
+    monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
+    for image, is_linear in ((small(Image.Resampling.NEAREST), False), (in_linear_light(), True)):
+        seen = pixels(image)
+        found, _ = without_optics(seen, 0.0, partial(trace, noise=0.0), show, lambda: False)
+        assert (found is not seen) == is_linear
 
 
 def test_plain_and_unsmoothed_images_have_no_kernel() -> None:

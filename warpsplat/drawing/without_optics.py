@@ -103,7 +103,7 @@ def _undone(
     best = first
     found, _ = look(first[1])
     usual = _cost(found.without, first[1].scene)
-    bound = usual + 10 * float(log10(CLEARLY))
+    bound = clearly = usual + 10 * float(log10(CLEARLY))
     if seen.edges.has_rings or seen.edges.is_linear:
         plain = seen.plain()
         traced = trace(plain)
@@ -121,7 +121,7 @@ def _undone(
         if cost >= bound:
             break
         bound, best = cost, (current, traced)
-    return best
+    return best if bound <= clearly else first
 
 
 def _busiest(edges: Bools) -> Box:
