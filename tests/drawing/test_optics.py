@@ -77,7 +77,7 @@ def show(scene: Scene) -> FloatArray:
 
 
 def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stairs, as pictures made small without a filter have, may look as if colours were mixed in linear light."""
+    """Stairs, as pictures made small without a filter have, may look as if mixed in linear light."""
     monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
     for image, is_linear in ((small(Image.Resampling.NEAREST), False), (in_linear_light(), True)):
         seen = pixels(image)
