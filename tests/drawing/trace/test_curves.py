@@ -35,6 +35,17 @@ def test_a_circle_is_four_cubics(radius: float) -> None:
     assert (off < 1e-6).any(axis=1).all(), "its nodes are where it is upright or level"
 
 
+@pytest.mark.parametrize("middle", [95.0, 100.0, 110.0])
+def test_a_bulge_of_a_long_line_is_kept(middle: float) -> None:
+    """The places at which a curve as long as the line is measured at first may all be beside it."""
+    x = np.arange(0.5, 400)
+    y = 10 + np.exp(-(((x - middle) / 4) ** 2))
+    run = Polyline(np.stack([x, y], axis=1), False, np.array([0.0, 10.0]), np.array([400.0, 10.0]))
+    (pieces,) = fit_polylines([run], [0.1])
+    drawn = points_at(pieces.cubics, np.linspace(0, 1, 200)).reshape(-1, 2)
+    assert np.abs(drawn[:, 1].max() - 11) < 0.1
+
+
 def test_polylines_fitted_in_one_call_equal_those_fitted_singly() -> None:
     rng = np.random.default_rng(1)
     corners = np.array([(0, 0), (9, 30), (40, 41), (10, 50), (1, 80), (-9, 50), (-40, 40), (-11, 30)], float)

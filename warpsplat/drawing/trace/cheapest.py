@@ -12,7 +12,8 @@ from warpsplat.drawing.trace.spans import Spans, between
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
-SAMPLES = 16  # points at which the error of a candidate is measured
+SAMPLES = 16  # points at which the error of a candidate is measured at first
+DENSE = 6  # points of a span that may lie from one of those to the next: what is between them is not seen
 CUBIC_COST = 1.4  # what a cubic counts, where a line and an error of the size of the tolerance count 1
 MOST_KNOTS = 48  # between which all curves are tried
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
@@ -110,11 +111,13 @@ def _candidates(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Fl
     return CurvePieces.joined([_some(spans, span[i], begin[i], end[i], tolerances) for i in parts])
 
 
-def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) -> CurvePieces:
+def _some(
+    spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats, samples: int = SAMPLES
+) -> CurvePieces:
     """Return candidates as ``_candidates``, not so many."""
     low, steps = spans.places[begin], spans.places[end] - spans.places[begin]
     start, goal = spans.knots[begin], spans.knots[end]
-    where = steps * np.linspace(0, 1, SAMPLES)[:, None]
+    where = steps * np.linspace(0, 1, samples)[:, None]
     x, y = np.moveaxis(between(spans.points, low, where, steps) - start, 2, 0)
     # Towards a knot its own place counts, not the noisy point there.
     x[0], y[0], (x[-1], y[-1]) = 0, 0, (goal - start).T
@@ -129,6 +132,10 @@ def _some(spans: Spans, span: Ints, begin: Ints, end: Ints, tolerances: Floats) 
     cubics[bent, 1] += handles[0][:, None] * ahead
     cubics[bent, 2] += handles[1][:, None] * back
     costs[bent] = _costs(errors, CUBIC_COST, tolerance[bent])
+    some = np.flatnonzero(np.isfinite(costs) & (steps > DENSE * samples))
+    if len(some):
+        finer = _some(spans, span[some], begin[some], end[some], tolerances, 4 * samples)
+        cubics[some], is_line[some], costs[some] = finer.cubics, finer.is_line, finer.costs
     return CurvePieces(span, begin, end, cubics, is_line, costs)
 
 
