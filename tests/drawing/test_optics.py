@@ -77,9 +77,9 @@ def show(scene: Scene) -> FloatArray:
 
 
 def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stairs, as pictures made small without a filter have, may look as if mixed in linear light."""
+    """Pictures may look as if their colours were mixed in it that were not."""
     monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
-    for image, is_linear in ((small(Image.Resampling.NEAREST), False), (in_linear_light(), True)):
+    for image, is_linear in ((small(Image.Resampling.HAMMING), False), (in_linear_light(), True)):
         seen = pixels(image)
         found, _ = without_optics(seen, 0.0, partial(trace, noise=0.0), show, lambda: False)
         assert (found is not seen) == is_linear

@@ -13,7 +13,9 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured at first
-DENSE = 6  # points of a span that may lie from one of those to the next: what is between them is not seen
+DENSE, BULGE = 6, 2.0
+"""Points of a span from one of those to the next, at the most, where it is looked for bulges between them, and
+the least error of a bulge, over the tolerance."""
 CUBIC_COST = 1.4  # what a cubic counts, where a line and an error of the size of the tolerance count 1
 MOST_KNOTS = 48  # between which all curves are tried
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache
@@ -134,8 +136,8 @@ def _some(
     costs[bent] = _costs(errors, CUBIC_COST, tolerance[bent])
     some = np.flatnonzero(np.isfinite(costs) & (steps > DENSE * samples))
     if len(some):
-        finer = _some(spans, span[some], begin[some], end[some], tolerances, 4 * samples)
-        cubics[some], is_line[some], costs[some] = finer.cubics, finer.is_line, finer.costs
+        finer = _some(spans, span[some], begin[some], end[some], BULGE * tolerances, 4 * samples)
+        costs[some[np.isinf(finer.costs)]] = np.inf
     return CurvePieces(span, begin, end, cubics, is_line, costs)
 
 
