@@ -14,7 +14,7 @@ from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured at first
 DENSE, BULGE = 6, 2.0
-"""Points of a span from one of those to the next, at the most, where it is looked for bulges between them, and
+"""Points of a span from one of those to the next, at the most, where bulges between them are looked for, and
 the least error of a bulge, over the tolerance."""
 CUBIC_COST = 1.4  # what a cubic counts, where a line and an error of the size of the tolerance count 1
 MOST_KNOTS = 48  # between which all curves are tried
