@@ -77,7 +77,7 @@ def show(scene: Scene) -> FloatArray:
 
 
 def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures may look as if their colours were mixed in it that were not."""
+    """A picture may look as if its colours were mixed in linear light when they were not."""
     monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
     for image, is_linear in ((small(Image.Resampling.HAMMING), False), (in_linear_light(), True)):
         seen = pixels(image)

@@ -67,7 +67,7 @@ def test_crossing_contours_are_cut_and_look_the_same(seed: int, rule: str) -> No
 
 @pytest.mark.parametrize("rule", ["nonzero", "evenodd"])
 def test_contours_that_cross_in_nodes_look_the_same(rule: str) -> None:
-    """Where one cuts into another in a node that both have, it comes out again across an edge."""
+    """A contour may enter another at a node that they share, and leave it across an edge."""
     for seed in range(40):
         random, rings = np.random.default_rng(seed), []
         shared = random.integers(4, 2 * SIDE - 4, (4, 2)) / 2

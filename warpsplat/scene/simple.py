@@ -167,18 +167,19 @@ def uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]]:
     following[first[1:] - 1] = first[:-1]
     pairs, places = intersections(cubics[..., -2:])
     crossed = np.isin(np.arange(len(rings)), owner[pairs])
+    parted: list[Floats] = []
     if cubics.shape[2] == 2:
-        crossed |= _meeting_twice(cubics, owner)
+        # Rings may cross in their nodes as well, or along an edge: between these, where they are grown.
+        may_cross = crossed | _meeting_twice(cubics, owner)
+        suspects = [ring for ring, is_one in zip(rings, may_cross, strict=True) if is_one]
+        others, made = uncrossed(_grown(suspects))
+        if made or crossed.any():
+            crossed, parted = may_cross, [ring[..., :2] for ring in (*others, *made)]
     touching = np.array([len(set(map(tuple, ring[:, 0, :2].tolist()))) < len(ring) for ring in rings])
     if not (crossed | touching).any():
         return rings, []
     new = [ring for ring, is_new in zip(rings, touching & ~crossed, strict=True) if is_new]
-    if crossed.any() and cubics.shape[2] == 2:
-        # They may cross in their nodes as well, or along an edge: between these, where they are grown.
-        crossing = [ring for ring, is_new in zip(rings, crossed, strict=True) if is_new]
-        new += [ring[..., :2] for part in uncrossed(_grown(crossing)) for ring in part]
-    elif len(pairs):
-        new += _joined(cubics, following, owner, pairs, places)
+    new += _joined(cubics, following, owner, pairs, places) if cubics.shape[2] > 2 and len(pairs) else parted
     kept = [ring for ring, is_new in zip(rings, crossed | touching, strict=True) if not is_new]
     return kept, [part for ring in new for part in _apart(ring)]
 

@@ -236,7 +236,7 @@ def test_a_slope_and_a_map_have_no_noise_but_grain_is() -> None:
 
 
 def test_a_thin_line_that_begins_at_a_margin_is_under_its_cover() -> None:
-    """From one side of it to the other, the shortest hidden way at the margin would leave all of it out."""
+    """The shortest hidden path from one side of it to the other, at the margin, would leave all of it out."""
     ranks = np.ones((20, 20), np.int32)
     ranks[10, :15] = 0
     right, left = [[1, 0]] * 15, [[-1, 0]] * 15

@@ -13,9 +13,8 @@ from warpsplat.portable.elementary import hypot
 from warpsplat.scene.scene import ranges, starts_of
 
 SAMPLES = 16  # points at which the error of a candidate is measured at first
-DENSE, BULGE = 6, 2.0
-"""Points of a span from one of those to the next, at the most, where bulges between them are looked for, and
-the least error of a bulge, over the tolerance."""
+DENSE = 6  # most points of a span from one of these to the next: a bulge between them could be missed
+BULGE = 2.0  # error of a bulge between them, over the tolerance, from which on a candidate is refused
 CUBIC_COST = 1.4  # what a cubic counts, where a line and an error of the size of the tolerance count 1
 MOST_KNOTS = 48  # between which all curves are tried
 CHUNK = 2048  # candidates that are fitted at once: their arrays fit a processor's cache

@@ -94,7 +94,7 @@ def hidden_path(cover: Cover, rank: int, has_holes: bool, goals: Floats, vertice
 
     def is_free(low: int, high: int) -> bool:
         polygon = np.concatenate([vertices[low : high + 1], goals[[high, low]]])
-        # The region is to the right of its boundary, and no way that leaves out a pixel of it is one.
+        # The region is to the right of its boundary: a path on that side would leave a part of it out.
         if area(polygon) > 1:
             return False
         return cover.hides_line(rank, goals[low], goals[high]) and cover.hides_polygon(below, polygon)
