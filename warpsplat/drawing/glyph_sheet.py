@@ -48,7 +48,7 @@ class GlyphSheet:
         levels = np.asarray(self.image, np.float32) * 255
         levels = np.concatenate([levels, np.full_like(levels[..., :1], 255)], axis=2)
         painted = (levels[..., 0] < 128).astype(np.int32)
-        labels, paint = components(painted, levels)
+        labels, paint = components(painted)
         colors = np.array([[255, 255, 255, 255], [0, 0, 0, 255]], np.float64)
         fills = colors.astype(np.float32)[painted]
         regions = Regions(levels, labels, fills, paint, [Coloring(color) for color in colors], 0.0)

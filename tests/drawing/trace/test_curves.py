@@ -10,6 +10,7 @@ from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.drawing.trace.cubics import handles_through
 from warpsplat.drawing.trace.curves import fit_polylines
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, components
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.drawing.trace.outlines import find_boundary
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.planar import find_loops
@@ -101,12 +102,11 @@ def test_cubics_merged_in_one_call_equal_those_merged_singly() -> None:
 @pytest.mark.parametrize("dark", [True, False])
 def test_a_diagonal_line_is_connected(dark: bool) -> None:
     """Of two colours that cross on a diagonal, the one that there is less of goes on."""
-    painted = np.zeros((12, 12), np.int32)
-    painted[np.arange(12), np.arange(12)] = 1
-    image = np.repeat(np.where((painted == 1) == dark, 0, 200)[..., None], 4, axis=2).astype(np.float32)
-    labels, _ = components(painted, image)
-    assert len(np.unique(labels[painted == 1])) == 1
-    loops = find_loops(labels, image)
+    painted = np.full((12, 12), int(not dark), np.int32)
+    painted[np.arange(12), np.arange(12)] = dark
+    labels, _ = components(painted)
+    assert len(np.unique(labels[painted == dark])) == 1
+    loops = find_loops(LabelMap.of(labels), LabelMap.of(painted))
     assert sorted(loops.region[~loops.is_hole].tolist()) == [0, 1, 2]
 
 
@@ -117,7 +117,7 @@ def test_straight_edges_are_exact(slope: float) -> None:
     image = levels(draw_exactly(body))
     found = find_partition(find_regions(image))
     assert len(found.paint) == 2
-    loops = find_loops(found.labels, found.fills)
+    loops = find_loops(found.labels, found.painted)
     boundary = find_boundary(loops, found)
     points = boundary.points / found.scale
     inner = boundary.is_good & (loops.others != NO_REGION) & (np.abs(points - 48) < 40).all(axis=1)
@@ -133,7 +133,7 @@ def test_cracks_without_antialiasing_stay() -> None:
         draw(ground("#fff") + '<rect x="10" y="20" width="30" height="9" fill="#123"/>', hard=True)
     )
     found = find_partition(find_regions(image))
-    loops = find_loops(found.labels, found.fills)
+    loops = find_loops(found.labels, found.painted)
     inner = (loops.others != NO_REGION) & (loops.vertices > 0).all(axis=1)
     inner &= (loops.vertices < 96 * found.scale).all(axis=1)
     x, y = (find_boundary(loops, found).points / found.scale)[inner].T

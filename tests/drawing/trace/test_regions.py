@@ -170,6 +170,17 @@ def test_fine_drawings_are_near_their_source(
     assert decibels(render(trace(image).scene, scale=scale), large) > least
 
 
+def test_thin_lines_of_a_large_image_are_as_fine() -> None:
+    """Cells are at borders alone, so that the rest of an image has no part in how many lie along a pixel."""
+    image = levels(draw_exactly(ground("#ffffff") + '<path d="M9 80 80 9" stroke="#123" stroke-width=".8"/>'))
+    large = np.full((1100, 1100, 4), 255, np.float32)
+    large[:96, :96] = image
+    small, found = (find_partition(find_regions(each)) for each in (image, large))
+    np.testing.assert_array_equal(
+        found.painted.window(0, 0, *small.labels.shape), small.painted.window(0, 0, *small.labels.shape)
+    )
+
+
 @pytest.mark.parametrize("seed", range(24))
 def test_regions_of_random_maps_keep_the_areas_of_each_pixel(seed: int) -> None:
     """Without antialiasing a share is off by a half at the most."""
@@ -180,10 +191,10 @@ def test_regions_of_random_maps_keep_the_areas_of_each_pixel(seed: int) -> None:
         [[255, 255, 255, 255], [200, 30, 20, 255], [20, 30, 120, 255], [0, 0, 0, 255]], np.float32
     )
     image = palette[painted]
-    labels, paint = components(painted, image)
+    labels, paint = components(painted)
     regions = Regions(image, labels, image, paint, [Coloring(color) for color in palette], 0.0)
     found = find_partition(regions)
-    shown = found.paint[found.labels].reshape(height, found.scale, width, found.scale)
+    shown = found.painted.window(0, 0, *found.labels.shape).reshape(height, found.scale, width, found.scale)
     own = (shown == painted[:, None, :, None]).mean(axis=(1, 3))
     assert own.min() > 0.4 and own.mean() > 0.6
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.drawing.trace.drawings import LOGO, STAR, decibels, draw, ground, photograph
-from warpsplat.drawing.trace.hidden import Cover, hidden_path
+from warpsplat.drawing.trace.hidden import HIDES_ALL, Cover, hidden_path
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.drawing.trace.seeds import noise_of
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.metrics import psnr
@@ -242,7 +243,7 @@ def test_a_thin_line_that_begins_at_a_margin_is_under_its_cover() -> None:
     right, left = [[1, 0]] * 15, [[-1, 0]] * 15
     steps = np.array([*right, [0, 1], *left])
     begins = np.cumsum([[0, 10], *steps[:-1]], axis=0)
-    cover = Cover(ranks)
+    cover = Cover(LabelMap.of(ranks).mapped(np.arange(2), HIDES_ALL))
     middles = cover.middles(np.zeros(len(steps), np.int32), begins, steps, steps.astype(np.float64))
     ends = np.array([[0.0, 10.0], [0.0, 11.0]])
     goals = np.concatenate([ends[:1], middles, ends[1:]])

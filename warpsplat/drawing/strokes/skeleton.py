@@ -10,7 +10,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Sets, depth
+from warpsplat.drawing.trace.grids import Bools, Floats, depth, joined
 from warpsplat.portable.elementary import hypot
 
 End = tuple[int, int]
@@ -120,10 +120,9 @@ def _without_burrs(graph: Graph) -> Graph:
 
 def contracted(graph: Graph, numbers: Iterable[int]) -> Graph:
     """Return the graph with each of some edges as one node with its ends."""
-    sets, gone = Sets(len(graph.places)), set(numbers)
-    for number in gone:
-        sets.join(*graph.edges[number].nodes)
-    names = sets.numbers()
+    gone = set(numbers)
+    ends = np.array([graph.edges[number].nodes for number in gone], np.intp).reshape(-1, 2)
+    names = joined(len(graph.places), *ends.T)
     sizes = np.bincount(names)
     places = np.stack([np.bincount(names, graph.places[:, axis]) / sizes for axis in (0, 1)], axis=1)
     radii = np.zeros(len(places))

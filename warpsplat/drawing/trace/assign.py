@@ -47,7 +47,7 @@ def without_specks(
     """
     painted, fills = painted.copy(), fills.copy()
     for reach in REACHES:
-        regions, _ = components(painted, image)
+        regions, _ = components(painted)
         sizes = np.bincount(regions.reshape(-1))
         small = (sizes <= SMALL)[regions]
         rows, columns = np.nonzero(small)

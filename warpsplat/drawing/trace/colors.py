@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Floats
+from warpsplat.drawing.trace.grids import NO_REGION, Floats
 from warpsplat.drawing.trace.partition import Partition
 from warpsplat.drawing.trace.regions import Regions
 from warpsplat.drawing.trace.seeds import ROUNDING
+from warpsplat.drawing.trace.shares import colors_at
 
 SWEEPS = 8  # over all colours, each of which is the best one beside the others
 
@@ -25,13 +25,17 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
         return partition
     known, count = np.array([c.color for c in partition.colorings], np.float64), len(partition.colorings)
     flat = np.array([c.ramp is None and not c.is_band for c in partition.colorings], np.bool_)
-    height, width = regions.image.shape[:2]
-    shown = regions.image.reshape(-1, 4).astype(np.float64)
-    cells = _by_pixel(partition.paint[partition.labels], height, width)
-    is_mixed = (cells != cells[:, :1]).any(axis=1)
-    pure, whole = cells[~is_mixed, 0], shown[~is_mixed]
-    cells, left = cells[is_mixed], shown[is_mixed]
-    left -= _by_pixel(partition.fills, height, width)[is_mixed].mean(axis=1, dtype=np.float64)
+    painted = partition.painted
+    cells = painted.blocks.reshape(-1, partition.scale**2)
+    mixed = np.flatnonzero((cells != cells[:, :1]).any(axis=1))
+    cells, (rows, columns) = cells[mixed], (each[mixed] // partition.scale for each in painted.corners)
+    left = regions.image[rows, columns].astype(np.float64)
+    at = np.broadcast_arrays(rows[:, None], columns[:, None], cells)[:2]
+    left -= colors_at(regions, cells, *at).mean(axis=1, dtype=np.float64)
+    pure = painted.pixels[1:-1, 1:-1].copy()
+    pure[rows, columns] = NO_REGION
+    whole = [channel[pure >= 0].astype(np.float64) for channel in np.moveaxis(regions.image, 2, 0)]
+    pure = pure[pure >= 0]
     # The area of each colouring in each mixed pixel where it is.
     keys, counts = np.unique(
         cells.astype(np.int64) * len(cells) + np.arange(len(cells))[:, None], return_counts=True
@@ -40,12 +44,13 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
     area, first = counts / cells.shape[1], np.searchsorted(paint, np.arange(count + 1))
     inner = np.bincount(pure, minlength=count)
     weight = inner + np.bincount(paint, area * area, count)
-    sums = np.stack([np.bincount(pure, channel, count) for channel in whole.T], axis=1)
+    sums = np.stack([np.bincount(pure, channel, count) for channel in whole], axis=1)
+    squares = sum(np.bincount(pure, channel * channel, count) for channel in whole)
 
     def error(colors: Floats) -> Floats:
         """Return the squared error of the pixels of each colouring, by the areas in which they show it."""
-        off, mixed = (np.square(each).sum(axis=1) for each in (whole - colors[pure], left))
-        return np.asarray(np.bincount(pure, off, count) + np.bincount(paint, area * mixed[pixel], count))
+        of_pure = squares + (colors * (inner[:, None] * colors - 2 * sums)).sum(axis=1)
+        return np.asarray(of_pure + np.bincount(paint, area * np.square(left).sum(axis=1)[pixel], count))
 
     before, colors = error(known), known.copy()
     for _ in range(SWEEPS):
@@ -65,10 +70,3 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
         for k, coloring in enumerate(partition.colorings)
     ]
     return replace(partition, colorings=colorings)
-
-
-def _by_pixel(cells: Any, height: int, width: int) -> Any:
-    """Return values of cells (row, column, ...) as those of pixels, shape (pixel, cell, ...)."""
-    scale, rest = len(cells) // height, cells.shape[2:]
-    cells = cells.reshape(height, scale, width, scale, *rest).swapaxes(1, 2)
-    return cells.reshape(height * width, scale * scale, *rest)

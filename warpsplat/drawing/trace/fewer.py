@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Floats, Ints
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.drawing.trace.nesting import shared_borders
 from warpsplat.drawing.trace.palette import least_worth
 from warpsplat.drawing.trace.regions import Regions
@@ -24,7 +25,7 @@ def fewer_regions(regions: Regions, most: int, price: float = 1.0) -> Regions:
     count = len(regions.paint)
     dearest = least_worth(count, regions.labels.size, regions.noise, price=price)
     beside: list[set[int]] = [set() for _ in range(count)]
-    for a, b in shared_borders(regions.labels, count):
+    for a, b in shared_borders(LabelMap.of(regions.labels), count):
         beside[a].add(b)
         beside[b].add(a)
     sizes = np.bincount(regions.labels.reshape(-1), minlength=count).tolist()

@@ -18,7 +18,7 @@ Bools = npt.NDArray[np.bool_]
 NO_REGION = -1
 """Label of a pixel that is in no region, and of everything outside the image."""
 
-SURROUNDINGS = 5  # [px] side of the square whose mean colour tells what is rare at a crossing
+AROUND = 3  # [px] up to which on each side of a crossing it is counted what is rarer
 
 
 class Box(NamedTuple):
@@ -102,29 +102,26 @@ def border(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
 
 
-class Sets:
-    """Disjoint sets of 0 .. count - 1 (union-find)."""
+def joined(count: int, one: Ints, other: Ints) -> Ints:
+    """Return the number of each item's set, where pairs are in one set each (union-find).
 
-    def __init__(self, count: int) -> None:
-        self._parent = list(range(count))
+    Args:
+        count: Of items.
+        one: An item of each pair, shape (pair,).
+        other: The other one, shape (pair,).
 
-    def find(self, item: int) -> int:
-        """Return the representative of the set that contains ``item``."""
-        parent = self._parent
-        while parent[item] != item:
-            parent[item] = parent[parent[item]]
-            item = parent[item]
-        return item
-
-    def join(self, a: int, b: int) -> None:
-        """Merge two sets."""
-        a, b = self.find(a), self.find(b)
-        self._parent[max(a, b)] = min(a, b)
-
-    def numbers(self) -> Ints:
-        """Return the number of each item's set, counted from 0 in the order of their first items."""
-        roots = [self.find(item) for item in range(len(self._parent))]
-        return np.asarray(np.unique(roots, return_inverse=True)[1], np.int32)
+    Returns:
+        Counted from 0 in the order of the first items, shape (count,).
+    """
+    parent = np.arange(count)
+    while len(one):
+        np.minimum.at(parent, np.maximum(one, other), np.minimum(one, other))
+        while (parent != (above := parent[parent])).any():
+            parent = above
+        one, other = parent[one], parent[other]
+        differ = one != other
+        one, other = one[differ], other[differ]
+    return np.asarray(np.unique(parent, return_inverse=True)[1], np.int32)
 
 
 def linked_components(across: Bools, down: Bools, inside: Bools) -> tuple[int, Ints]:
@@ -148,22 +145,19 @@ def linked_components(across: Bools, down: Bools, inside: Bools) -> tuple[int, I
     return count - 1, np.asarray(parts[::2, ::2] - 1, np.int32)
 
 
-def components(values: Ints, image: Floats) -> tuple[Ints, Ints]:
+def components(values: Ints) -> tuple[Ints, Ints]:
     """Label the connected components of equal ``values``, shape (height, width); return their values, too.
 
-    Where two values meet as on a chessboard, ``prefers_main_diagonal`` decides which pair is connected.
+    Where two values cross as on a chessboard, ``prefers_main_diagonal`` decides which pair is connected.
     """
     everywhere = np.ones(values.shape, np.bool_)
     count, parts = linked_components(values[:, 1:] == values[:, :-1], values[1:] == values[:-1], everywhere)
-    sets = Sets(count)
     rows, columns = np.nonzero(crossings(values))
-    preferred = prefers_main_diagonal(image, rows, columns)
-    for y, x, main in zip(rows.tolist(), columns.tolist(), preferred.tolist(), strict=True):
-        if main:
-            sets.join(int(parts[y, x]), int(parts[y + 1, x + 1]))
-        else:
-            sets.join(int(parts[y, x + 1]), int(parts[y + 1, x]))
-    labels = sets.numbers()[parts]
+    around = np.pad(values, AROUND - 1, constant_values=NO_REGION)
+    side = np.arange(2 * AROUND)
+    down, right = rows[:, None, None] + side[:, None], columns[:, None, None] + side
+    main = prefers_main_diagonal(around[down, right]).astype(np.intp)
+    labels = joined(count, parts[rows, columns + 1 - main], parts[rows + 1, columns + main])[parts]
     of_each = np.zeros(int(labels.max()) + 1, np.int32)
     of_each[labels] = values
     return labels, of_each
@@ -175,24 +169,17 @@ def crossings(labels: Ints) -> Bools:
     return np.asarray((a == d) & (b == c) & (a != b))
 
 
-def prefers_main_diagonal(image: Floats, rows: Ints, columns: Ints) -> Bools:
+def prefers_main_diagonal(around: Ints) -> Bools:
     """Return whether upper left and lower right, not the other two, are the connected pixels of crossings.
 
-    The pair whose colour is rarer nearby is connected: it is a thin line.
+    The pair whose label is rarer nearby is connected: it is a thin line.
 
     Args:
-        image: Shape (height, width, channel).
-        rows: Row of the upper left pixel of each crossing.
-        columns: Its column.
+        around: The labels around each crossing, shape (crossing, 2 * AROUND, 2 * AROUND).
     """
-    if not len(rows):
-        return np.zeros(0, np.bool_)
-    a, b = image[rows, columns], image[rows, columns + 1]
-    c, d = image[rows + 1, columns], image[rows + 1, columns + 1]
-    soft = filters.box_blur(np.asarray(image, np.float32), SURROUNDINGS)
-    mean = sum(soft[rows + down, columns + right] for down in (0, 1) for right in (0, 1)) / 4
-    main, other = np.abs((a + d) / 2 - mean).max(axis=1), np.abs((b + c) / 2 - mean).max(axis=1)
-    return np.asarray(main >= other)
+    main, other = around[:, AROUND, AROUND], around[:, AROUND - 1, AROUND]
+    counts = [(around == own[:, None, None]).sum(axis=(1, 2)) for own in (main, other)]
+    return np.asarray(counts[0] <= counts[1])
 
 
 def nearest_in(mask: Bools) -> Ints:

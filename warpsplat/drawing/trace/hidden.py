@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import cv2
 import numpy as np
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, eroded
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene.simple import area
 
@@ -18,26 +18,24 @@ most [px]."""
 
 MARGIN = 0.7  # [px] between a hidden line and where it would be seen
 
+HIDES_ALL = int(np.iinfo(np.int64).max)
+"""Rank of what is outside an image."""
+
 
 @dataclass(frozen=True)
 class Cover:
     """The opaque regions, by their rank in the order of painting."""
 
-    ranks: Ints
-    """Rank of what is painted at each pixel, -1 where that hides nothing; shape (height, width)."""
-
-    @cached_property
-    def _framed(self) -> Ints:
-        """The ranks with a frame of pixels that hide all, shape (height + 2, width + 2)."""
-        return np.pad(self.ranks, 1, constant_values=np.iinfo(self.ranks.dtype).max)
+    ranks: LabelMap
+    """Rank of what is painted at each cell, -1 where that hides nothing; outside, ``HIDES_ALL``."""
 
     def hides(self, rank: Ints | int, points: Floats) -> Bools:
         """Return whether regions of these ranks are hidden at points, shape (point, 2); outside, all are."""
         x, y = (
-            np.minimum(np.maximum(np.floor(places).astype(np.intp), -1), size) + 1
+            np.minimum(np.maximum(np.floor(places).astype(np.intp), -1), size)
             for places, size in zip(points.T, self.ranks.shape[::-1], strict=True)
         )
-        return np.asarray(self._framed[y, x] > rank)
+        return np.asarray(self.ranks.at(y, x) > rank)
 
     def hides_line(self, rank: int, start: Floats, end: Floats) -> bool:
         """Return whether a straight line with a margin is hidden, its ends aside."""
@@ -54,8 +52,10 @@ class Cover:
         right, bottom = np.ceil(polygon.max(axis=0)).astype(np.intp) + 1
         mask = np.zeros((bottom - top, right - left), np.uint8)
         cv2.fillPoly(mask, [np.round(polygon - low - 0.5).astype(np.int32)], 1)
-        seen = self.ranks[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] <= rank
-        inside = eroded(mask, 3)[max(-top, 0) :, max(-left, 0) :][: seen.shape[0], : seen.shape[1]]
+        height, width = self.ranks.shape
+        box = max(top, 0), max(left, 0), min(bottom, height), min(right, width)
+        seen = self.ranks.window(*box) <= rank
+        inside = eroded(mask, 3)[box[0] - top : box[2] - top, box[1] - left : box[3] - left]
         return not (inside & seen).any()
 
     def middles(self, rank: Ints, begins: Ints, steps: Ints, trends: Floats) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.partition import Partition
 
@@ -70,12 +71,12 @@ def find_nesting(partition: Partition) -> Nesting:
     return Nesting(parent, depth, colorings)
 
 
-def shared_borders(labels: Ints, count: int) -> dict[tuple[int, int], int]:
-    """Return the length of the border of each two regions that have one [px], the smaller number first."""
-    one = np.concatenate([labels[:, 1:].reshape(-1), labels[1:].reshape(-1)]).astype(np.int64)
-    other = np.concatenate([labels[:, :-1].reshape(-1), labels[:-1].reshape(-1)]).astype(np.int64)
-    keys = np.minimum(one, other) * count + np.maximum(one, other)
-    keys, lengths = np.unique(keys[one != other], return_counts=True)
+def shared_borders(labels: LabelMap, count: int) -> dict[tuple[int, int], int]:
+    """Return the length of the border of each two regions that have one, the smaller number first."""
+    above, before = labels.sides()
+    one, other = (np.concatenate(pair).astype(np.int64) for pair in zip(above[2:], before[2:], strict=True))
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    keys, lengths = np.unique((low * count + high)[low >= 0], return_counts=True)
     pairs = zip((keys // count).tolist(), (keys % count).tolist(), strict=True)
     return dict(zip(pairs, lengths.tolist(), strict=True))
 

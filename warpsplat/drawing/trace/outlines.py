@@ -46,7 +46,8 @@ def _offsets(loops: Loops, partition: Partition) -> Floats:
     inner, outer = loops.vertices + INSIDE[loops.directions], loops.vertices + OUTSIDE[loops.directions]
     height, width = partition.labels.shape
     real = (loops.others != NO_REGION) & ((inner >= 0) & (inner < [width, height])).all(axis=1)
-    mine, theirs = (partition.lead[each[real, 1], each[real, 0]] for each in (inner, outer))
+    leads = np.append(partition.lead.reshape(-1), 1)  # that of whole pixels is the last
+    mine, theirs = (leads[partition.labels.place(*each[real].T[::-1])] for each in (inner, outer))
     offsets = np.zeros(len(inner))
     offsets[real] = mine / np.maximum(mine + theirs, 1e-6) - 0.5
     return offsets

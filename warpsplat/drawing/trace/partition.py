@@ -10,21 +10,21 @@ from remotely sensed images").
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, components, dilated
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, dilated
+from warpsplat.drawing.trace.label_map import LabelMap, label_components
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
-from warpsplat.drawing.trace.shares import Shares, beside_borders, colors_at, find_shares
+from warpsplat.drawing.trace.shares import Shares, beside_borders, find_shares
 from warpsplat.scene.scene import numbers_in
 
 FINEST = 4
 """Cells of the finest grid along a pixel."""
 
-MOST_CELLS = 1 << 20
-"""Cells of a grid finer than the pixels, which bounds time and memory."""
+MOST_CELLS = 1 << 24
+"""Cells at borders, if they are finer than the pixels, which bounds time and memory."""
 
 MOST_DOUBT = 0.5
 """How far off boundaries may be on such a grid [cell]: what is finer shows noise."""
@@ -44,19 +44,26 @@ GENTLEST = 0.7
 class Partition:
     """Connected regions on a grid of cells, of which one or several lie along a pixel."""
 
-    labels: Ints
-    """The region of each cell, shape (row, column)."""
-    fills: Floats
-    """The colour of each cell, shape (row, column, 4)."""
+    labels: LabelMap
+    """The region of each cell."""
     lead: Floats
-    """How far the colouring of a cell is ahead of any other there, shape (row, column): 0 at a boundary."""
+    """How far the colouring of a cell is ahead of any other there, shape (block, scale, scale): 0 at a
+    boundary; in pixels that are whole it is 1."""
     paint: Ints
     """The colouring of each region, shape (region,)."""
     colorings: list[Coloring]
-    scale: int
-    """Cells along a pixel."""
     doubt: Floats
     """How far off the shares of pixels may be, and so the boundaries in them [px], shape (height, width)."""
+
+    @property
+    def scale(self) -> int:
+        """Cells along a pixel."""
+        return self.labels.scale
+
+    @property
+    def painted(self) -> LabelMap:
+        """The colouring of each cell."""
+        return self.labels.mapped(self.paint)
 
 
 def find_partition(regions: Regions) -> Partition:
@@ -64,21 +71,15 @@ def find_partition(regions: Regions) -> Partition:
     shares = find_shares(regions)
     at_border = beside_borders(shares.first) | (shares.share < 1)
     doubt = _usual(shares, at_border)
-    pixels = regions.labels.size
-    finer = range(FINEST, 1, -1)
-    scale = next((s for s in finer if s * s * pixels <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
     # A border between pixels that are surely of one colouring each is exactly there.
-    is_open = at_border & ((shares.share < 1) | (shares.doubt > 0))
-    rows, columns = np.nonzero(dilated(is_open, 3))
-    painted = _in_cells(shares.first, scale)
-    lead = np.ones(painted.shape, np.float32)
-    down, right = np.ogrid[:scale, :scale]
-    cells = scale * rows[:, None, None] + down, scale * columns[:, None, None] + right
-    painted[cells], lead[cells] = _leading(shares, rows, columns, scale)
-    down, right = np.ogrid[: painted.shape[0], : painted.shape[1]]
-    fills = colors_at(regions, painted, *np.broadcast_arrays(down // scale, right // scale))
-    labels, paint = components(painted, fills)
-    return Partition(labels, fills, lead, paint, regions.colorings, scale, shares.doubt)
+    rows, columns = np.nonzero(dilated(at_border & ((shares.share < 1) | (shares.doubt > 0)), 3))
+    finer = range(FINEST, 1, -1)
+    scale = next((s for s in finer if s * s * len(rows) <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
+    painted, lead = _leading(shares, rows, columns, scale)
+    labels, paint = label_components(LabelMap.cut(shares.first, rows, columns, painted))
+    leads = np.ones(labels.blocks.shape, np.float32)
+    leads[labels.block[rows + 1, columns + 1]] = lead
+    return Partition(labels, leads, paint, regions.colorings, shares.doubt)
 
 
 def _usual(shares: Shares, at_border: Bools) -> float:
@@ -86,11 +87,6 @@ def _usual(shares: Shares, at_border: Bools) -> float:
     mixed = shares.share < 1
     some = shares.doubt[mixed if mixed.any() else at_border]
     return float(some.mean()) if len(some) else 0.0
-
-
-def _in_cells(values: Any, scale: int) -> Any:
-    """Return pixels (height, width, ...) as cells: each of them ``scale`` times along both sides."""
-    return np.repeat(np.repeat(values, scale, axis=0), scale, axis=1)
 
 
 def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Ints, Floats]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from warpsplat.alpha import straight
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, border, linked_components
+from warpsplat.drawing.trace.label_map import LabelMap
 from warpsplat.drawing.trace.lattice import MOST_COLORS, Cells, find_lattice
 from warpsplat.drawing.trace.planar import find_loops
 from warpsplat.errors import ImageError
@@ -82,7 +83,8 @@ def outlines(inside: Bools) -> list[Ints]:
     corner only are outlined separately.
     """
     _, parts = linked_components(inside[:, 1:], inside[1:], inside)
-    loops = find_loops(parts, inside[..., None].astype(np.float32), np.ones(int(parts.max()) + 1, np.bool_))
+    labels = LabelMap.of(parts)
+    loops = find_loops(labels, labels, np.ones(int(parts.max()) + 1, np.bool_))
     loop = np.repeat(np.arange(len(loops)), np.diff(loops.first))
     before = np.arange(len(loop)) - 1
     before[loops.first[:-1]] = loops.first[1:] - 1

@@ -1,4 +1,4 @@
-"""The planar map of a label map: regions bounded by loops of cracks, the sides of pixels between two labels.
+"""The planar map of a label map: regions bounded by loops of cracks, the sides of cells between two labels.
 
 Cracks are directed: the region that a loop bounds lies on their right (the y axis points down).
 """
@@ -10,20 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import (
-    NO_REGION,
-    Bools,
-    Floats,
-    Ints,
-    Sets,
-    crossings,
-    prefers_main_diagonal,
-)
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, joined
+from warpsplat.drawing.trace.label_map import LabelMap
 
 RIGHT, DOWN, LEFT, UP = range(4)
 
 INSIDE = -np.array([(way in (DOWN, LEFT), way in (LEFT, UP)) for way in (RIGHT, DOWN, LEFT, UP)], np.intp)
-"""x and y of the pixel on the right of a crack by its direction, from the vertex where it begins."""
+"""x and y of the cell on the right of a crack by its direction, from the vertex where it begins."""
 
 OUTSIDE = INSIDE[[UP, RIGHT, DOWN, LEFT]]
 """The same on its left."""
@@ -58,36 +51,34 @@ class Loops:
         return _networks(self.vertices, self.directions, self.first)
 
 
-def find_loops(labels: Ints, image: Floats, chosen: Bools | None = None) -> Loops:
+def find_loops(labels: LabelMap, values: LabelMap, chosen: Bools | None = None) -> Loops:
     """Trace the boundaries of regions.
 
     Args:
-        labels: Shape (height, width).
-        image: What the labels are of; it decides which of two regions is connected where they cross.
+        labels: Of the regions.
+        values: What regions are components of; it decides which of two is connected where they cross.
         chosen: The regions, shape (region,). None: all, and the outside of the image.
     """
-    height, width = labels.shape
-    padded = np.pad(labels, 1, constant_values=NO_REGION)
-    corners = [padded[1 + y :, 1 + x :][: height + 1, : width + 1] for x, y in INSIDE.tolist()]
-    # Two diagonal pixels of one label are connected in a vertex, unless the other two are.
-    rows, columns = np.nonzero(crossings(labels))
-    prefers_main = prefers_main_diagonal(image, rows, columns)
-    parted = np.zeros((2, height + 1, width + 1), np.bool_)  # on the main diagonal, and on the other one
-    parted[prefers_main.astype(np.intp), rows + 1, columns + 1] = True
+    width = labels.shape[1]
+    (y, x, above, own), (row, column, before, mine) = labels.sides()
+    cracks = {RIGHT: (x, y, own, above), LEFT: (x + 1, y, above, own)}
+    cracks |= {DOWN: (column, row, before, mine), UP: (column, row + 1, mine, before)}
     wanted = None if chosen is None else np.append(chosen, False)  # NO_REGION is the last
     keys, following, regions, others = [], [], [], []
-    for direction in (RIGHT, DOWN, LEFT, UP):
-        inside, outside = corners[direction], corners[direction - 1]
-        differ = inside != outside
-        ys, xs = np.nonzero(differ if wanted is None else differ & wanted[inside])
-        mine, theirs = inside[ys, xs], outside[ys, xs]
-        end_x, end_y = xs + STEPS[direction, 0], ys + STEPS[direction, 1]
-        goes_on, crosses = inside[end_y, end_x] == mine, outside[end_y, end_x] == mine
-        # At the end of a level crack, ours and the pixel across are on the other diagonal.
-        crosses &= goes_on | ~parted[int(direction in (RIGHT, LEFT)), end_y, end_x]
+    for direction, found in cracks.items():
+        some = slice(None) if wanted is None else wanted[found[2]]
+        x, y, mine, theirs = (each[some] for each in found)
+        end = np.stack([x, y], axis=1) + STEPS[direction]
+        inside, outside = (labels.at(*(end + side[direction]).T[::-1]) for side in (INSIDE, OUTSIDE))
+        goes_on, crosses = inside == mine, outside == mine
+        # Two diagonal cells of one label are connected, unless the other two are.
+        meets = np.flatnonzero(crosses & ~goes_on & (inside == theirs))
+        main = values.prefers_main(end[meets, 1], end[meets, 0])
+        # At the end of a level crack, ours and the cell across are on the other diagonal.
+        crosses[meets[main == (direction in (RIGHT, LEFT))]] = False
         turn = np.where(crosses, UP, np.where(goes_on, RIGHT, DOWN))
-        keys.append((ys * (width + 1) + xs) * 4 + direction)
-        following.append((end_y * (width + 1) + end_x) * 4 + (direction + turn) % 4)
+        keys.append((y * (width + 1) + x) * 4 + direction)
+        following.append((end[:, 1] * (width + 1) + end[:, 0]) * 4 + (direction + turn) % 4)
         regions.append(mine)
         others.append(theirs)
     return _assembled(width, *(np.concatenate(part) for part in (keys, following, regions, others)))
@@ -144,8 +135,5 @@ def _networks(vertices: Ints, directions: Ints, first: Ints) -> Ints:
     # Both directions of a crack have the same upper left end.
     start = np.minimum(vertices, vertices + STEPS[directions])
     crack = (start[:, 1] * (vertices[:, 0].max(initial=0) + 1) + start[:, 0]) * 2 + directions % 2
-    pairs = np.unique(loop[np.argsort(crack, kind="stable")].reshape(-1, 2), axis=0)
-    sets = Sets(len(first) - 1)
-    for a, b in pairs.tolist():
-        sets.join(a, b)
-    return sets.numbers()
+    pairs = loop[np.argsort(crack, kind="stable")].reshape(-1, 2)
+    return joined(len(first) - 1, *pairs.T)

@@ -74,7 +74,7 @@ def find_regions(
     check()
     # From here on, pixels have the number of a colouring instead of a part.
     painted, fills = without_specks(image, *fill_gaps(image, parts), noise, price)
-    labels, paint = components(painted, image)
+    labels, paint = components(painted)
     return Regions(image, labels, fills, paint, parts.colorings, noise)
 
 

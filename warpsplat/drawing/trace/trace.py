@@ -14,8 +14,8 @@ from warpsplat.drawing.trace.colors import with_best_colors
 from warpsplat.drawing.trace.contours import Fill, assembled, joints_of, merged
 from warpsplat.drawing.trace.curves import Pieces, fit_polylines
 from warpsplat.drawing.trace.fewer import fewer_regions
-from warpsplat.drawing.trace.grids import Bools, Ints, at_pixels, border, unchecked
-from warpsplat.drawing.trace.hidden import Cover
+from warpsplat.drawing.trace.grids import Bools, Ints, at_pixels, unchecked
+from warpsplat.drawing.trace.hidden import HIDES_ALL, Cover
 from warpsplat.drawing.trace.nesting import OPAQUE, find_nesting
 from warpsplat.drawing.trace.order import (
     Tree,
@@ -117,14 +117,15 @@ def trace_partition(
     """
     check()
     nesting, count = find_nesting(partition), len(partition.paint)
-    flat = replace(partition, labels=nesting.shown(0)[partition.labels])
-    loops = find_loops(flat.labels, flat.fills)
+    painted = partition.painted
+    flat = replace(partition, labels=partition.labels.mapped(nesting.shown(0)))
+    loops = find_loops(flat.labels, painted)
     boundary = find_boundary(loops, flat)
     tree = find_tree(loops, count)
     unpainted, ground = _ground(partition, tree, may_have_ground=may_have_ground)
     if removal:
         unpainted, ground = _removed(partition, removal)
-    sizes = np.bincount(flat.labels.reshape(-1), minlength=count)
+    sizes = flat.labels.sizes(count)
     ranks = nesting.ordered(find_ranks(loops, tree, sizes, unpainted))
     is_clear = np.array([coloring.color[3] < OPAQUE for coloring in flat.colorings])[flat.paint]
     layers = _layers(flat, loops, boundary, tree, ranks, is_clear | unpainted if removal else is_clear)
@@ -132,8 +133,8 @@ def trace_partition(
     outlines = find_outlines(layers)
     for depth in range(1, int(nesting.depth.max()) + 1):
         check()
-        layer = replace(partition, labels=nesting.shown(depth)[partition.labels])
-        inner = find_loops(layer.labels, layer.fills, nesting.depth == depth)
+        layer = replace(partition, labels=partition.labels.mapped(nesting.shown(depth)))
+        inner = find_loops(layer.labels, painted, nesting.depth == depth)
         # Bands hide nothing, so that the cover is the same at all depths.
         layers = replace(layers, loops=inner, boundary=find_boundary(inner, layer), has_holes=True)
         outlines += find_outlines(layers)
@@ -144,7 +145,7 @@ def trace_partition(
         Fill(nesting.colorings[region], contours[region])
         for region in sorted(contours, key=lambda region: ranks[region])
     ]
-    height, width = (side // partition.scale for side in partition.labels.shape)
+    height, width = partition.doubt.shape
     background = None if ground is None else (ground.color[:3] / 255).astype(np.float32)
     return _scene(Canvas(width, height, background), merged(shapes))
 
@@ -182,7 +183,7 @@ def _layers(
     # Something transparent may lie between regions as well as inside one; what reaches the border of the
     # image is not between them.
     has_holes = bool(enclosed(loops, holed).any())
-    cover = Cover(hiding[partition.labels])
+    cover = Cover(partition.labels.mapped(hiding, HIDES_ALL))
     return Layers(loops, boundary, ranks, hiding, cover, in_holes_with(loops, holed), has_holes)
 
 
@@ -196,9 +197,9 @@ def _ground(partition: Partition, tree: Tree, *, may_have_ground: bool) -> tuple
     opaque = all(partition.colorings[paint].color[3] >= OPAQUE for paint in numbers_in(partition.paint))
     if not may_have_ground or not opaque or clear.any():
         return clear, None
-    painted = partition.paint[partition.labels]
-    edge = border(painted)
-    areas = np.bincount(painted.reshape(-1), minlength=len(partition.colorings))
+    edge, count = partition.painted.border(), len(partition.colorings)
+    sizes = partition.labels.sizes(len(partition.paint))
+    areas = np.bincount(partition.paint, sizes, count)
     paint = int((areas * np.isin(np.arange(len(areas)), edge)).argmax())
     if partition.colorings[paint].ramp is not None:
         return np.zeros(len(partition.paint), np.bool_), None
@@ -211,7 +212,7 @@ ALIKE = 6.0
 
 def _removed(partition: Partition, removal: str) -> tuple[Bools, Coloring]:
     """Return which regions are not painted as the ground is removed, and its colouring, the border's."""
-    edge = border(partition.labels)
+    edge = partition.labels.border()
     ground = partition.colorings[int(np.bincount(partition.paint[edge]).argmax())]
     off = np.array([np.abs(coloring.color - ground.color).max() for coloring in partition.colorings])
     is_ground = (off <= ALIKE)[partition.paint]
