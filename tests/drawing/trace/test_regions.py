@@ -170,6 +170,15 @@ def test_fine_drawings_are_near_their_source(
     assert decibels(render(trace(image).scene, scale=scale), large) > least
 
 
+def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:
+    """Nothing of its colour is near, but the image is mostly of it."""
+    image = levels(draw_exactly(ground("#ffffff") + '<path d="M20 70h40v25.7H20z" fill="#102030"/>'))
+    found = find_partition(find_regions(image))
+    cells = found.painted.window(0, 0, *found.labels.shape)
+    middle = cells[:, 40 * found.scale]
+    assert middle[-1] == cells[0, 0] != middle[-2]
+
+
 def test_thin_lines_of_a_large_image_are_as_fine() -> None:
     """Cells are at borders alone, so that the rest of an image has no part in how many lie along a pixel."""
     image = levels(draw_exactly(ground("#ffffff") + '<path d="M9 80 80 9" stroke="#123" stroke-width=".8"/>'))

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpsplat.drawing.trace.grids import NO_REGION, Floats, Ints, components, nearest_in
 from warpsplat.drawing.trace.mixtures import MIXED, REACH, unmix
-from warpsplat.drawing.trace.palette import Parts, least_worth
+from warpsplat.drawing.trace.palette import Coloring, Parts, least_worth
 
 SMALL = 60  # [px] of the largest region that may be given up
 
@@ -25,9 +25,7 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
     free of them, and paper that has no seed near it would be taken for ink.
     """
     painted = np.where(parts.labels == NO_REGION, NO_REGION, parts.paint[parts.labels])
-    sizes = np.bincount(painted[painted != NO_REGION], minlength=len(parts.colorings))
-    sizes = sizes * [coloring.ramp is None for coloring in parts.colorings]
-    main = (int(sizes.argmax()), parts.colorings[sizes.argmax()].color) if sizes.any() else None
+    main = main_color(painted, parts.colorings)
     fills, (rows, columns) = parts.fills.copy(), np.nonzero(painted == NO_REGION)
     found = unmix(image, painted, fills, rows, columns, main=main)
     painted[rows, columns], fills[rows, columns] = found.label, found.color
@@ -36,6 +34,14 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
         take = nearest_in(~empty)[empty]
         painted[empty], fills[empty] = painted.reshape(-1)[take], fills.reshape(-1, fills.shape[2])[take]
     return painted, fills
+
+
+def main_color(painted: Ints, colorings: list[Coloring]) -> tuple[int, Floats] | None:
+    """Return the flat colouring that covers most of an image, its number and its colour; None if none does."""
+    sizes = np.bincount(painted[painted != NO_REGION], minlength=len(colorings))
+    sizes = sizes * [coloring.ramp is None for coloring in colorings]
+    most = int(sizes.argmax())
+    return (most, colorings[most].color) if sizes[most] else None
 
 
 def without_specks(

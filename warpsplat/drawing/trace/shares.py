@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpsplat.drawing.trace.assign import main_color
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max, nearest_of
 from warpsplat.drawing.trace.mixtures import unmix
 from warpsplat.drawing.trace.regions import Regions
@@ -45,14 +46,17 @@ def find_shares(regions: Regions) -> Shares:
     is_band = np.array([coloring.is_band for coloring in regions.colorings])
     first, second = painted.copy(), painted.copy()
     share, unsure = np.ones(painted.shape, np.float32), np.zeros(painted.shape, np.float32)
-    some = rows, columns = np.nonzero(
-        channel_max(np.abs(regions.image - regions.fills)) > ROUNDING + regions.noise
-    )
-    # Steps of smooth shading are not mixed with one another.
-    found = unmix(regions.image, painted, regions.fills, rows, columns, apart=is_band)
-    first[some], second[some], share[some] = found.label, found.other, found.share
-    contrast = np.where(found.label == found.other, 255, np.maximum(found.contrast, 1))
-    unsure[some] = np.minimum(OUTLIERS * (found.residual + regions.noise) / contrast, 0.5)
+    is_off = channel_max(np.abs(regions.image - regions.fills)) > ROUNDING + regions.noise
+    inside = np.zeros(painted.shape, np.bool_)
+    inside[1:-1, 1:-1] = True
+    # A strip along the border of an image may show the last of what lies beyond, mostly the main colour.
+    for where, main in ((inside, None), (~inside, main_color(painted, regions.colorings))):
+        some = rows, columns = np.nonzero(is_off & where)
+        # Steps of smooth shading are not mixed with one another.
+        found = unmix(regions.image, painted, regions.fills, rows, columns, apart=is_band, main=main)
+        first[some], second[some], share[some] = found.label, found.other, found.share
+        contrast = np.where(found.label == found.other, 255, np.maximum(found.contrast, 1))
+        unsure[some] = np.minimum(OUTLIERS * (found.residual + regions.noise) / contrast, 0.5)
     if _is_stepped(first, share < 1 - PURE):
         share, unsure = np.ones_like(share), np.full_like(unsure, 0.5)
     # They end anywhere between.
