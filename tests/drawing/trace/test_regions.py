@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 import pytest
 
@@ -168,6 +169,25 @@ def test_fine_drawings_are_near_their_source(
     image = draw_exactly(body, width, height)
     image = as_file(image, "webp", quality=80) if width == 256 else image
     assert decibels(render(trace(image).scene, scale=scale), large) > least
+
+
+def test_the_ground_between_lines_of_a_mesh_stays() -> None:
+    """JPEG leaves nothing flat between them, and most of the image has another colour."""
+    lines = "".join(
+        f'<path d="M{x} 30l48 66M{x + 48} 30l-48 66" stroke="#111" stroke-width=".6"/>'
+        for x in range(-64, 160, 7)
+    )
+    image = draw_exactly(ground("#fff") + '<path d="M0 26h96v70H0z" fill="#d8d2b0"/>' + lines)
+    _, code = cv2.imencode(
+        ".jpg", np.round(255 * image[..., ::-1]).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 95]
+    )
+    decoded = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR))
+    image = levels(decoded[..., ::-1].astype(np.float32) / 255)
+    found = find_regions(image)
+    colors = np.array([coloring.color for coloring in found.colorings])[found.paint[found.labels]]
+    paper = [216, 210, 176, 255]
+    is_paper, shown = (np.abs(each - paper).max(axis=2) <= 8 for each in (image, colors))
+    assert shown[is_paper].mean() > 0.9
 
 
 def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:

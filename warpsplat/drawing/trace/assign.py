@@ -37,7 +37,7 @@ def fill_gaps(image: Floats, parts: Parts) -> tuple[Ints, Floats]:
 
 
 def main_color(painted: Ints, colorings: list[Coloring]) -> tuple[int, Floats] | None:
-    """Return the flat colouring that covers most of an image, its number and its colour; None if none does."""
+    """Return number and colour of the flat colouring that covers most of an image; None if none does."""
     sizes = np.bincount(painted[painted != NO_REGION], minlength=len(colorings))
     sizes = sizes * [coloring.ramp is None for coloring in colorings]
     most = int(sizes.argmax())

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
 
-from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max
-from warpsplat.drawing.trace.mixtures import MIXED, mixed, unmix
+from warpsplat.drawing.trace.grids import NO_REGION, Bools, Floats, Ints, channel_max, dilated, nearest_in
+from warpsplat.drawing.trace.mixtures import MIXED, REACH, mixed, unmix
 from warpsplat.drawing.trace.palette import Coloring, Parts, least_worth
 from warpsplat.portable import filters
 
@@ -35,6 +35,7 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
         parts: What is labelled from seeds.
         noise: Of flat regions [levels].
     """
+    parts = _with_distant(image, parts, MIXED + noise)
     rows, columns = np.nonzero(parts.labels == NO_REGION)
     mixtures = unmix(image, parts.labels, parts.fills, rows, columns, noise)
     is_off = mixtures.residual > MIXED + noise
@@ -65,6 +66,23 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
         labels[place], fills[place] = len(paint), inks[k]
         paint.append(k)
     return Parts(labels, fills, np.asarray(paint, np.int32), colorings)
+
+
+def _with_distant(image: Floats, parts: Parts, limit: float) -> Parts:
+    """Label what no region is near, but has the colour of the nearest one: ground between lines.
+
+    ``limit``: how far off it may be [levels].
+    """
+    known = parts.labels != NO_REGION
+    far = np.nonzero(~dilated(known, 2 * REACH + 1))
+    if not len(far[0]):
+        return parts
+    nearest = np.unravel_index(nearest_in(known)[far], known.shape)
+    alike = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
+    labels, fills = parts.labels.copy(), parts.fills.copy()
+    own, source = ((rows[alike], columns[alike]) for rows, columns in (far, nearest))
+    labels[own], fills[own] = labels[source], fills[source]
+    return replace(parts, labels=labels, fills=fills)
 
 
 @dataclass(frozen=True)
