@@ -190,6 +190,18 @@ def test_the_ground_between_lines_of_a_mesh_stays() -> None:
     assert shown[is_paper].mean() > 0.9
 
 
+def test_noise_of_a_level_does_not_hide_thin_outlines() -> None:
+    """Hues of mixtures may be off as far as the noise of a JPEG tells, not wherever there is some noise."""
+    leaves = "".join(
+        f'<ellipse cx="{x}" cy="{y}" rx="7" ry="4"/>' for x in (14, 37, 59, 82) for y in (11, 27, 48, 69, 85)
+    )
+    image = levels(draw_exactly(ground("#fff") + f'<g fill="#3b7d43" stroke="#14532d">{leaves}</g>'))
+    image[..., :3] += np.random.default_rng(5).integers(-1, 2, (96, 96, 3))
+    found = find_regions(np.clip(image, 0, 255))
+    greens = [coloring.color[1] for coloring in found.colorings if coloring.color[1] < 230]
+    assert len(greens) >= 2 and min(greens) < 110
+
+
 def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:
     """Nothing of its colour is near, but the image is mostly of it."""
     image = levels(draw_exactly(ground("#ffffff") + '<path d="M20 70h40v25.7H20z" fill="#102030"/>'))
