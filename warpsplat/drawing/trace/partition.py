@@ -9,11 +9,12 @@ from remotely sensed images").
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpsplat.drawing.trace.grids import Bools, Floats, Ints, dilated
+from warpsplat.drawing.trace.grids import Bools, Floats, Ints, dilated, unchecked
 from warpsplat.drawing.trace.label_map import LabelMap, label_components
 from warpsplat.drawing.trace.palette import Coloring
 from warpsplat.drawing.trace.regions import Regions
@@ -66,8 +67,11 @@ class Partition:
         return self.labels.mapped(self.paint)
 
 
-def find_partition(regions: Regions) -> Partition:
-    """Return regions with boundaries between and within the pixels of their image."""
+def find_partition(regions: Regions, check: Callable[[], None] = unchecked) -> Partition:
+    """Return regions with boundaries between and within the pixels of their image.
+
+    ``check``: as for ``trace``.
+    """
     shares = find_shares(regions)
     at_border = beside_borders(shares.first) | (shares.share < 1)
     doubt = _usual(shares, at_border)
@@ -75,7 +79,8 @@ def find_partition(regions: Regions) -> Partition:
     rows, columns = np.nonzero(dilated(at_border & ((shares.share < 1) | (shares.doubt > 0)), 3))
     finer = range(FINEST, 1, -1)
     scale = next((s for s in finer if s * s * len(rows) <= MOST_CELLS and s * doubt <= MOST_DOUBT), 1)
-    painted, lead = _leading(shares, rows, columns, scale)
+    painted, lead = _leading(shares, rows, columns, scale, check)
+    check()
     labels, paint = label_components(LabelMap.cut(shares.first, rows, columns, painted))
     leads = np.ones(labels.blocks.shape, np.float32)
     leads[labels.block[rows + 1, columns + 1]] = lead
@@ -89,7 +94,9 @@ def _usual(shares: Shares, at_border: Bools) -> float:
     return float(some.mean()) if len(some) else 0.0
 
 
-def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Ints, Floats]:
+def _leading(
+    shares: Shares, rows: Ints, columns: Ints, scale: int, check: Callable[[], None]
+) -> tuple[Ints, Floats]:
     """Return the colouring of each cell of some pixels, and how far it is ahead of the next one.
 
     Shape (pixel, scale, scale) each.
@@ -102,6 +109,7 @@ def _leading(shares: Shares, rows: Ints, columns: Ints, scale: int) -> tuple[Int
     index = np.full(shares.share.shape, -1, np.intp)
     index[rows, columns] = np.arange(len(rows))
     for k in numbers:
+        check()
         if len(numbers) == 2:  # one is where the other is not
             values = _level(shares.of(k, np.s_[:, :]), rows, columns, shares.doubt, scale)
             return np.where(values >= 0.5, *numbers), np.abs(2 * values - 1)

@@ -86,7 +86,7 @@ def trace(
     regions = fewer_regions(regions, max(FEW_REGIONS, height * width // LEAST_AREA), price)
 
     def outlined(regions: Regions) -> Traced:
-        partition = with_best_colors(find_partition(regions), regions)
+        partition = with_best_colors(find_partition(regions, check), regions)
         return trace_partition(
             partition, may_have_ground=is_opaque, check=check, removal=removal if is_opaque else None
         )
