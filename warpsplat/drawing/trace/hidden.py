@@ -14,9 +14,9 @@ from warpsplat.scene.simple import area
 
 NEAREST, DEEPEST = 0.5, 16.0
 """How far beyond its boundary what hides a region is measured: first, which is the step as well, and at the
-most [px]."""
+most [cell]."""
 
-MARGIN = 0.7  # [px] between a hidden line and where it would be seen
+MARGIN = 0.7  # [cell] between a hidden line and where it would be seen
 
 HIDES_ALL = int(np.iinfo(np.int64).max)
 """Rank of what is outside an image."""

@@ -9,7 +9,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import NO_REGION, Bools, Ints
 from warpsplat.drawing.trace.planar import Loops
 
-LINE_WIDTH = 7.0  # [px] of the widest region that is a line
+LINE_WIDTH = 7.0  # [cell] of the widest region that is a line
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ class Boundary:
     is_good: Bools
     """Which of them to use: horizontal cracks of flat parts of an outline, vertical ones of steep parts."""
     offsets: Floats
-    """How far the boundary lies to the left of each crack [px], shape (crack,)."""
+    """How far the boundary lies to the left of each crack [cell], shape (crack,)."""
     trends: Floats
     """Direction of the outline, not normalised, shape (crack, 2)."""
 

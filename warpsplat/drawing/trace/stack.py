@@ -23,7 +23,7 @@ from warpsplat.scene.scene import ranges, starts_of
 SEEN, EDGE, HIDDEN = range(3)
 """The side across a crack: a lower region, the outside of the image, a higher region."""
 
-UNDER = 1.0  # [px] how far an outline goes on under the region above it before it turns
+UNDER = 1.0  # [cell] how far an outline goes on under the region above it before it turns
 TAIL = 3  # points at the end of a stretch that tell its direction there
 Outline = list[Polyline | Floats]
 """A contour before its curves are fitted: runs, and corners (point, 2) between one run and the next."""
