@@ -173,10 +173,7 @@ def test_fine_drawings_are_near_their_source(
 
 def test_the_ground_between_lines_of_a_mesh_stays() -> None:
     """JPEG leaves nothing flat between them, and most of the image has another colour."""
-    lines = "".join(
-        f'<path d="M{x} 30l48 66M{x + 48} 30l-48 66" stroke="#111" stroke-width=".6"/>'
-        for x in range(-64, 160, 7)
-    )
+    lines = "".join(f'<path d="M{x} 30l48 66M{x + 48} 30l-48 66" stroke="#111"/>' for x in range(-64, 160, 9))
     image = draw_exactly(ground("#fff") + '<path d="M0 26h96v70H0z" fill="#d8d2b0"/>' + lines)
     _, code = cv2.imencode(
         ".jpg", np.round(255 * image[..., ::-1]).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 95]
@@ -188,18 +185,6 @@ def test_the_ground_between_lines_of_a_mesh_stays() -> None:
     paper = [216, 210, 176, 255]
     is_paper, shown = (np.abs(each - paper).max(axis=2) <= 8 for each in (image, colors))
     assert shown[is_paper].mean() > 0.9
-
-
-def test_noise_of_a_level_does_not_hide_thin_outlines() -> None:
-    """Hues of mixtures may be off as far as the noise of a JPEG tells, not wherever there is some noise."""
-    leaves = "".join(
-        f'<ellipse cx="{x}" cy="{y}" rx="7" ry="4"/>' for x in (14, 37, 59, 82) for y in (11, 27, 48, 69, 85)
-    )
-    image = levels(draw_exactly(ground("#fff") + f'<g fill="#3b7d43" stroke="#14532d">{leaves}</g>'))
-    image[..., :3] += np.random.default_rng(5).integers(-1, 2, (96, 96, 3))
-    found = find_regions(np.clip(image, 0, 255))
-    greens = [coloring.color[1] for coloring in found.colorings if coloring.color[1] < 230]
-    assert len(greens) >= 2 and min(greens) < 110
 
 
 def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:

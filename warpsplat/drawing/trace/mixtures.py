@@ -17,8 +17,8 @@ REACH = 3  # [px] how far
 CHUNK = 1 << 14  # pixels handled at once, which bounds the memory
 DISTANCE_COST = 0.5  # [levels] what a pixel of distance to a region counts against it
 RESIDUAL_WEIGHT = 0.01  # keeps an order among mixtures whose residual is within the slack
-SLACK, MOST_SLACK = 0.1, 0.2  # how far a mixture may be off for free by level of noise, and at the most, over
-# the difference of its colours: JPEG blurs hues more than lightness
+SLACK = 0.2  # how far a mixture may be off for free in a noisy image, over the difference of its colours:
+# JPEG blurs hues more than lightness
 MIXED = 7.0  # [levels] up to this residual, besides noise, a pixel is a mixture
 
 
@@ -76,7 +76,7 @@ def unmix(
         fills: The colour of that region there, shape (height, width, channel).
         rows: Of the pixels, shape (pixel,).
         columns: Of the pixels, shape (pixel,).
-        noise: By its level mixtures have some slack.
+        noise: Where it is not 0, mixtures have some slack.
         reach: How far away regions are looked for [px].
         apart: The regions that are not mixed with one another, shape (region,).
         main: A region and its colour that may be mixed with those near where these alone do not explain a
@@ -130,7 +130,7 @@ def _unmix(
     # Each channel lies together: steps of four take several times as long.
     colors = np.moveaxis(np.ascontiguousarray(np.moveaxis(colors, 2, 0)), 0, 2)
     pixels = np.ascontiguousarray(image[rows, columns].T).T
-    count, slack = len(rows), min(SLACK * noise, MOST_SLACK)
+    count, slack = len(rows), SLACK if noise else 0.0
     best, residual = np.full((2, count), np.inf, np.float32)
     one, other, share = np.zeros(count, np.int64), np.zeros(count, np.int64), np.ones(count, np.float32)
     for a, b in pairs:

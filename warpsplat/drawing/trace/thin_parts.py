@@ -20,6 +20,7 @@ TRIED = 32  # colours of pixels, and pairs of these and what is beside, from whi
 PARALLEL = 0.01  # squared sine of the angle below which two mixtures do not tell where they meet
 WITHIN = 0.03  # what a squared error within the limit counts for, over one beyond it
 EQUAL = 0.25  # of the limit: mixtures that are less off are as good as exact
+SOME = 4  # of 3x3 pixels that have the colour of ground, for it to be there
 SAMPLES, BLOCK = 1 << 16, 32  # pixels by which inks are judged, about, in blocks of so many along a side
 
 
@@ -78,7 +79,10 @@ def _with_distant(image: Floats, parts: Parts, limit: float) -> Parts:
     if not len(far[0]):
         return parts
     nearest = np.unravel_index(nearest_in(known)[far], known.shape)
-    alike = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
+    ground = np.zeros(known.shape)
+    ground[far] = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
+    # A few pixels may be mixtures that have this colour by chance.
+    alike = (ground[far] > 0) & (filters.box_sum(ground, 3)[far] >= SOME)
     labels, fills = parts.labels.copy(), parts.fills.copy()
     own, source = ((rows[alike], columns[alike]) for rows, columns in (far, nearest))
     labels[own], fills[own] = labels[source], fills[source]
