@@ -18,7 +18,7 @@ Bools = npt.NDArray[np.bool_]
 NO_REGION = -1
 """Label of a pixel that is in no region, and of everything outside the image."""
 
-AROUND = 3  # [px] up to which on each side of a crossing it is counted what is rarer
+AROUND = 3  # [px] on each side of a crossing, within which labels are counted
 
 
 class Box(NamedTuple):

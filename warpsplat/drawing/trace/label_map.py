@@ -20,10 +20,10 @@ from warpsplat.drawing.trace.grids import (
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """A label for each cell of an image, which lie along each pixel ``scale`` times.
+    """A label for each cell of an image, of which ``scale`` lie along each side of a pixel.
 
-    Pixels with one label, which their neighbours have, too, are whole, so that memory and time follow from
-    the length of borders. Around the image is a frame of pixels without a label, NO_REGION.
+    A pixel whose neighbours have the same label is kept whole, so that memory and time grow with the length
+    of borders. Around the image is a frame of pixels without a label, NO_REGION.
     """
 
     pixels: Ints

@@ -20,7 +20,7 @@ TRIED = 32  # colours of pixels, and pairs of these and what is beside, from whi
 PARALLEL = 0.01  # squared sine of the angle below which two mixtures do not tell where they meet
 WITHIN = 0.03  # what a squared error within the limit counts for, over one beyond it
 EQUAL = 0.25  # of the limit: mixtures that are less off are as good as exact
-SOME = 4  # of 3x3 pixels that have the colour of ground, for it to be there
+FEWEST = 4  # pixels of 3x3 that have the colour of a distant region, so that it is no chance
 SAMPLES, BLOCK = 1 << 16, 32  # pixels by which inks are judged, about, in blocks of so many along a side
 
 
@@ -36,7 +36,7 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
         parts: What is labelled from seeds.
         noise: Of flat regions [levels].
     """
-    parts = _with_distant(image, parts, MIXED + noise)
+    parts = _with_distant_pixels(image, parts, MIXED + noise)
     rows, columns = np.nonzero(parts.labels == NO_REGION)
     mixtures = unmix(image, parts.labels, parts.fills, rows, columns, noise)
     is_off = mixtures.residual > MIXED + noise
@@ -69,8 +69,8 @@ def add_thin_parts(image: Floats, parts: Parts, noise: float) -> Parts:
     return Parts(labels, fills, np.asarray(paint, np.int32), colorings)
 
 
-def _with_distant(image: Floats, parts: Parts, limit: float) -> Parts:
-    """Label what no region is near, but has the colour of the nearest one: ground between lines.
+def _with_distant_pixels(image: Floats, parts: Parts, limit: float) -> Parts:
+    """Return parts with the pixels that are far from all, but have the colour of the nearest: between lines.
 
     ``limit``: how far off it may be [levels].
     """
@@ -79,10 +79,10 @@ def _with_distant(image: Floats, parts: Parts, limit: float) -> Parts:
     if not len(far[0]):
         return parts
     nearest = np.unravel_index(nearest_in(known)[far], known.shape)
-    ground = np.zeros(known.shape)
-    ground[far] = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
-    # A few pixels may be mixtures that have this colour by chance.
-    alike = (ground[far] > 0) & (filters.box_sum(ground, 3)[far] >= SOME)
+    found = np.zeros(known.shape)
+    found[far] = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
+    # Lone pixels may be mixtures of that colour by chance.
+    alike = (found[far] > 0) & (filters.box_sum(found, 3)[far] >= FEWEST)
     labels, fills = parts.labels.copy(), parts.fills.copy()
     own, source = ((rows[alike], columns[alike]) for rows, columns in (far, nearest))
     labels[own], fills[own] = labels[source], fills[source]

@@ -197,9 +197,9 @@ def _ground(partition: Partition, tree: Tree, *, may_have_ground: bool) -> tuple
     opaque = all(partition.colorings[paint].color[3] >= OPAQUE for paint in numbers_in(partition.paint))
     if not may_have_ground or not opaque or clear.any():
         return clear, None
-    edge, count = partition.painted.border(), len(partition.colorings)
+    edge = partition.paint[partition.labels.border()]
     sizes = partition.labels.sizes(len(partition.paint))
-    areas = np.bincount(partition.paint, sizes, count)
+    areas = np.bincount(partition.paint, sizes, len(partition.colorings))
     paint = int((areas * np.isin(np.arange(len(areas)), edge)).argmax())
     if partition.colorings[paint].ramp is not None:
         return np.zeros(len(partition.paint), np.bool_), None
