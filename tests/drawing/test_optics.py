@@ -85,6 +85,23 @@ def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatc
         assert (found is not seen) == is_linear
 
 
+@pytest.mark.parametrize(("second", "traces"), [(100.1, 4), (99.9, 6)])
+def test_linear_light_is_given_up_after_two_turns_that_explain_no_more(
+    monkeypatch: pytest.MonkeyPatch, second: float, traces: int
+) -> None:
+    """A map as a JPEG was explained a little better in each of six turns, and much worse by its fit."""
+    costs = iter([105.0, 100.0, 103.0, 102.0, second, 97.0, 98.0])
+    monkeypatch.setattr(without_optics_module, "_cost", lambda *_: next(costs))
+    seen, traced = pixels(in_linear_light()), list[Traced]()
+
+    def counted(each: FloatArray) -> Traced:
+        traced.append(trace(each))
+        return traced[-1]
+
+    result, _ = without_optics(seen, 0.0, counted, show, lambda: False)
+    assert len(traced) == traces and (result is seen) == (second > 100)
+
+
 def test_plain_and_unsmoothed_images_have_no_kernel() -> None:
     """Any kernel that sharpens would explain steps."""
     found = Seen.of(pixels(small(BOX))).find(pixels(small(BOX, SCALE)))

@@ -112,8 +112,9 @@ def _undone(
             if cost > usual + 10 * float(log10(MOVED)):
                 return first
             bound, best = cost, (plain, traced)
-    for _ in range(turns):
-        if over():
+    for turn in range(turns):
+        # Traces explain more from turn to turn, even through optics that the picture never had.
+        if over() or (turn > 1 and bound > usual):
             break
         current = seen.plain(found.undone)
         traced = trace(current)
