@@ -14,7 +14,6 @@ import numpy as np
 from PIL import Image, ImageFilter
 
 import warpsplat
-from warpsplat.fit.settings import OpticsChoice
 from warpsplat.svg.viewer import on_white, render_svg
 
 FILE = Path(__file__).parent / "images" / "optics.webp"
@@ -64,7 +63,7 @@ MADE: list[Callable[[IMAGE], IMAGE]] = [
 """Sharpened, blurred, resized in linear light, scanned."""
 
 
-def drawn(image: IMAGE, optics: OpticsChoice = "auto") -> IMAGE:
+def drawn(image: IMAGE, optics: str = "auto") -> IMAGE:
     """Return a drawing of an image as a viewer shows it, enlarged."""
     svg = warpsplat.vectorize(image, subject="drawing", optics=optics).svg
     return Image.fromarray(np.asarray(on_white(render_svg(svg, zoom=ZOOM))).astype(np.uint8))

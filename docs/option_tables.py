@@ -17,14 +17,13 @@ HEAD = '''"""Keywords of ``vectorize`` and others; made by ``python docs/option_
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
 from warpsplat.fit.settings import (
     DxfCurves,
     LossName,
-    OpticsChoice,
     Painting,
     Quality,
     Removal,
@@ -59,6 +58,8 @@ def typed_options() -> str:
 
 def annotation(option: Option) -> str:
     """Return the type of an option's values as users write them."""
+    if option.name == "optics":  # or those of a report
+        return "Mapping[str, object] | str"
     if option.name == "loss":  # or a function
         return "LossName | LossFunction | CustomLoss"
     written = {**Settings.__annotations__, **make_settings.__annotations__}.get(option.keyword, "bool")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,15 +18,18 @@ from tests.drawing.trace.drawings import decibels, draw
 from warpsplat.drawing import optics as optics_module
 from warpsplat.drawing import without_optics as without_optics_module
 from warpsplat.drawing.constraints import DRAFT_GRID
-from warpsplat.drawing.edges import LINEAR, MIDDLES, find_edges
+from warpsplat.drawing.edges import LINEAR, MIDDLES, Edges, find_edges
 from warpsplat.drawing.optics import NONE, SCALE, Seen
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.seen_colors import MOST_COLORS, with_seen_colors
 from warpsplat.drawing.trace.trace import Traced, trace
 from warpsplat.drawing.without_optics import without_optics
+from warpsplat.errors import UsageError
 from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.optics import RADIUS, RINGS, Kernel, Optics, parse_optics
 from warpsplat.fit.settings import make_settings
+from warpsplat.run.options import settings_from
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.svg.viewer import on_white, render_svg
 
@@ -46,8 +51,8 @@ def small(how: Image.Resampling, times: int = 1) -> Image.Image:
     return enlarged(BIG).resize((times * SIDE, times * SIDE), how)
 
 
-def in_linear_light() -> Image.Image:
-    light = LINEAR[np.asarray(enlarged(BIG))].reshape(SIDE, BIG, SIDE, BIG, 3).mean(axis=(1, 3))
+def in_linear_light(large: Image.Image | None = None) -> Image.Image:
+    light = LINEAR[np.asarray(large or enlarged(BIG))].reshape(SIDE, BIG, SIDE, BIG, 3).mean(axis=(1, 3))
     return Image.fromarray(np.searchsorted(MIDDLES, light.astype(np.float32)).astype(np.uint8))
 
 
@@ -81,8 +86,21 @@ def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
     for image, is_linear in ((small(Image.Resampling.HAMMING), False), (in_linear_light(), True)):
         seen = pixels(image)
-        found, _ = without_optics(seen, 0.0, partial(trace, noise=0.0), show, lambda: False)
+        found = without_optics(seen, 0.0, partial(trace, noise=0.0), show, lambda: False).pixels
         assert (found is not seen) == is_linear
+
+
+def test_a_kernel_is_found_where_colours_only_look_mixed_in_linear_light(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def voted(image: FloatArray, noise: float = 0.0, *, is_linear: bool | None = None) -> Edges:
+        return find_edges(image, noise, is_linear=is_linear is not False)
+
+    monkeypatch.setattr(optics_module, "find_edges", voted)
+    blurred = pixels(MADE["blurred"]())
+    found = without_optics(blurred, 0.0, partial(trace, noise=0.0), show, lambda: False)
+    assert found.optics == Optics("sRGB")
+    assert decibels(found.pixels, pixels(small(BOX))) > decibels(blurred, pixels(small(BOX))) + 4
 
 
 @pytest.mark.parametrize(("second", "traces"), [(100.1, 4), (99.9, 6)])
@@ -98,8 +116,57 @@ def test_linear_light_is_given_up_after_two_turns_that_explain_no_more(
         traced.append(trace(each))
         return traced[-1]
 
-    result, _ = without_optics(seen, 0.0, counted, show, lambda: False)
+    result = without_optics(seen, 0.0, counted, show, lambda: False).pixels
     assert len(traced) == traces and (result is seen) == (second > 100)
+
+
+def quarter(kernel: Kernel) -> list[list[float]]:
+    """A kernel as reports have it."""
+    weights = dict(zip(RINGS, kernel, strict=True))
+    return [[weights[max(y, x), min(y, x)] for x in range(RADIUS)] for y in range(RADIUS)]
+
+
+def test_known_optics_are_undone_however_well_they_explain() -> None:
+    """Those of a report are not looked for again."""
+    image = pixels(MADE["blurred"]())
+    report = warpsplat.vectorize(image, subject="drawing", quality="draft").optics
+    assert report is not None
+    other = pixels(small(BOX))
+    again = warpsplat.vectorize(other, subject="drawing", quality="draft", optics=report.as_dict()).optics
+    assert again is not None and again.light == report.light
+    np.testing.assert_allclose(again.kernel, report.kernel, atol=1e-4)
+    assert warpsplat.vectorize(other, subject="drawing", quality="draft").optics is None
+    linear = warpsplat.vectorize(other, subject="drawing", quality="draft", optics="linear").optics
+    assert linear is not None and linear.light == "linear"
+
+
+def test_optics_are_words_or_those_of_a_report(tmp_path: Path) -> None:
+    text = parse_optics({"light": "linear", "kernel": quarter(NONE)})
+    assert parse_optics(text) == text and Optics.of(text) == Optics("linear", NONE)
+    assert Optics.of("auto") == Optics.of("none") == Optics()
+    assert Optics.of("linear").is_certain and not Optics.of("sRGB").is_certain
+    file = tmp_path / "report.json"
+    file.write_text(json.dumps({"psnr": 30, "optics": {"light": "sRGB", "kernel": quarter(NONE)}}))
+    assert settings_from({"optics": str(file)}).optics == "sRGB " + text.split(maxsplit=1)[1]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("atuo", "did you mean 'auto'"),
+        ("report.json", "report.json: No such file"),
+        ("{", "optics must be auto, none, sRGB, linear or a report.json"),
+        ({"optics": None}, "must have a light"),
+        ({"light": "red"}, "sRGB or linear, not 'red'"),
+        ({"kernel": [[1.0]]}, "5 rows of 5 numbers"),
+        ({"kernel": [["1"] * 5] * 5}, "5 rows of 5 numbers"),
+        ({"kernel": [[0.25, 0, 0, 0, 0], *[[0.1, 0, 0, 0, 0]] * 4]}, "the same across and down"),
+        ({"kernel": [[0.1] * 5] * 5}, "must add up to 1/4, not 2.5"),
+    ],
+)
+def test_wrong_optics_are_refused(given: object, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        settings_from({"optics": given})
 
 
 def test_plain_and_unsmoothed_images_have_no_kernel() -> None:
@@ -119,7 +186,7 @@ def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late:
         traced.append(trace(each))
         return traced[-1]
 
-    result, _ = without_optics(image, None, once, show, lambda: is_late)
+    result = without_optics(image, None, once, show, lambda: is_late).pixels
     assert result is image and len(traced) == 1
 
 
@@ -128,7 +195,7 @@ def test_a_part_of_a_large_picture_tells_whether_there_is_a_kernel(monkeypatch: 
     monkeypatch.setattr(without_optics_module, "LOOK", 40)
     monkeypatch.setattr(without_optics_module, "PARTS", 4)
     blurred = pixels(MADE["blurred"]())
-    result, _ = without_optics(blurred, None, trace, show, bool)
+    result = without_optics(blurred, None, trace, show, bool).pixels
     assert decibels(result, pixels(small(BOX))) > decibels(blurred, pixels(small(BOX))) + 4
     traced = list[tuple[int, ...]]()
 
@@ -138,7 +205,7 @@ def test_a_part_of_a_large_picture_tells_whether_there_is_a_kernel(monkeypatch: 
 
     odd = pixels(small(BOX)).copy()
     odd[40:70, 4:34] = (np.indices((30, 30)).sum(axis=0) % 2)[..., None]
-    result, _ = without_optics(odd, None, counted, show, bool)
+    result = without_optics(odd, None, counted, show, bool).pixels
     assert result is odd
     assert traced == [(SIDE, SIDE), (40, 40), (40, 40)], "then the part, as it is and without a kernel"
 
@@ -180,6 +247,17 @@ def test_ringing_and_linear_light_are_detected(how: str | None) -> None:
     if how != "by Lanczos":  # which leaves several rings, the outermost of which are faint
         assert found.has_rings == (how in ("sharpened", "by bicubic"))
     assert found.is_linear == (how == "in linear light")
+
+
+@pytest.mark.parametrize("width", [0.8, 1.6, 3.0])
+def test_thin_lines_tell_linear_light(width: float) -> None:
+    """Where nothing is wide, there is no edge between two flat colours."""
+    arcs = "".join(f'<path d="M{x} 90A70 70 0 0 1 92 {x}"/>' for x in range(4, 60, 9))
+    body = f'<g transform="scale({BIG})" fill="none" stroke="#1d3557" stroke-width="{width}">{arcs}</g>'
+    body = f'<rect width="768" height="768" fill="#fff"/>{body}'
+    large = Image.fromarray(np.round(255 * draw(body, BIG * SIDE, BIG * SIDE)).astype(np.uint8))
+    assert find_edges(np.asarray(in_linear_light(large), np.float32)).is_linear
+    assert not find_edges(np.asarray(large.resize((SIDE, SIDE), BOX), np.float32)).is_linear
 
 
 def test_outlines_are_no_rings() -> None:

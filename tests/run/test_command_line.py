@@ -131,11 +131,11 @@ def test_generated_files_are_current() -> None:
 
 def test_a_palette_is_read_up_to_its_limit(tmp_path: Path) -> None:
     path = tmp_path / "colors.txt"
-    path.write_text("#ff0000 " * (options.PALETTE_BYTES // 8))
+    path.write_text("#ff0000 " * (options.MOST_BYTES // 8))
     assert len(settings_from({"palette": str(path)}).palette) == 1
     with path.open("a") as file:
         file.write("#00ff00")
-    with pytest.raises(UsageError, match=f"has more than {options.PALETTE_BYTES} bytes"):
+    with pytest.raises(UsageError, match=f"has more than {options.MOST_BYTES} bytes"):
         settings_from({"palette": str(path)})
 
 

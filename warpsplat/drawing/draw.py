@@ -14,7 +14,7 @@ from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import GlyphSheet
 from warpsplat.drawing.glyphs import find_glyphs
-from warpsplat.drawing.optics import SCALE
+from warpsplat.drawing.optics import NONE, SCALE
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import TRACED_PSNR
@@ -22,6 +22,7 @@ from warpsplat.drawing.trace.regions import smoothed
 from warpsplat.drawing.without_optics import without_optics
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.optics import Optics
 from warpsplat.fit.palette import solid_shapes
 from warpsplat.fit.problem import Fit, Problem, Run
 from warpsplat.fit.rounding import finest
@@ -71,7 +72,8 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
 
         compile_meanwhile(Kind.FILL, run.backend)
     most = None if settings.simplify else settings.curves
-    picture, price = Picture.of(problem.target, is_soft=settings.optics == "none"), byte_price(settings)
+    is_soft = settings.optics == "none" or Optics.of(settings.optics).kernel is not None
+    picture, price = Picture.of(problem.target, is_soft=is_soft), byte_price(settings)
     announce_trace(picture, settings)
     picture, found = _sharp(picture, settings, run, most)
     if not run.over():
@@ -170,11 +172,12 @@ def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> 
     if settings.optics == "none":
         return picture, trace(picture.pixels)
     seen = picture.seen if picture.is_halved else None
-    pixels, found = without_optics(picture.pixels, picture.noise, trace, show, run.over, seen)
-    if pixels is picture.pixels:
-        return picture, found
+    known = Optics.of(settings.optics)
+    undone = without_optics(picture.pixels, picture.noise, trace, show, run.over, seen, known)
+    if undone.optics is None:
+        return picture, undone.traced
     seen = picture.pixels if seen is None else seen
-    return replace(picture, pixels=pixels, seen=seen, has_kernel=True), found
+    return replace(picture, pixels=undone.pixels, seen=seen, optics=undone.optics), undone.traced
 
 
 def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price: float) -> Fit:
@@ -189,7 +192,8 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
         done = _finish(settings, found.rest, found.drawing, next(runs), grid=glyphs.per_pixel, **options)
         scene = limited(found.sheet.placed(glyphs.drawing.scene, done.drawing.scene), settings)
     else:
-        options |= {"seen": picture.seen, "has_kernel": picture.has_kernel}
+        # Halved colours alone have no kernel.
+        options |= {"seen": picture.seen, "optics": picture.optics or Optics("sRGB", NONE)}
         done = _finish(settings, found.rest, found.drawing, run, **options)
         scene = done.drawing.scene
     scene = picture.placed(scene)
@@ -200,8 +204,8 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
     psnr = done.psnr - 10 * float(elementary.log10(picture.share))
     grid = done.per_pixel / float(picture.enlargement.mean())
     scene = simple(rounded(scene, grid), grid)
-    is_sharper = picture.is_interpolated or picture.has_kernel
-    return Fit(scene, grid, psnr, psnr, 0, run.stopped(), is_sharper=is_sharper)
+    optics = picture.optics or (Optics() if picture.is_interpolated else None)
+    return Fit(scene, grid, psnr, psnr, 0, run.stopped(), optics=optics)
 
 
 def _finish(settings: Settings, target: FloatArray, drawing: Drawing, run: Run, **options: Any) -> Finished:

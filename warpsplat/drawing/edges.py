@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from warpsplat.drawing.trace.grids import Bools, Floats, Ints, channel_max
 from warpsplat.drawing.trace.mixtures import MIXED, mixed
@@ -65,6 +66,21 @@ class _Crossings:
     columns: Ints
     """The column of each."""
 
+    def beside(self, shape: tuple[int, ...], tolerance: float) -> list[Ints]:
+        """Return the crossing of the same edge in the row above and below each; -1: none."""
+        after = np.full((shape[0] + 2, shape[1] + 4), -1)
+        after[self.rows + 1, self.before + 2] = np.arange(len(self.rows))
+        beside = []
+        for down in (-1, 1):
+            number = np.full(len(self.rows), -1)
+            for right in (2, -2, 1, -1, 0):
+                other = after[self.rows + 1 + down, self.before + 2 + right]
+                same = [channel_max(np.abs(c - c[other])) <= tolerance for c in (self.one, self.other)]
+                is_next = (other >= 0) & same[0] & same[1]
+                number[is_next] = other[is_next]
+            beside.append(number)
+        return beside
+
 
 def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = None) -> Edges:
     """Find the clean edges of an image.
@@ -81,6 +97,7 @@ def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = No
         is_linear = False
     if is_linear is None:
         votes = [_votes(side, found, tolerance) for side, found in zip(sides, crossings, strict=True)]
+        votes += [_line_votes(side, _crossings(side, tolerance, of_lines=True), tolerance) for side in sides]
         linear, gamma = (sum(vote[i] for vote in votes) for i in (0, 1))
         is_linear = linear - gamma > SURE * float(np.sqrt(linear + gamma))
     plain, clean = image.copy(), np.zeros(image.shape[:2], np.bool_)
@@ -111,8 +128,8 @@ def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = No
     return Edges(plain, clean, 2 * ringed > count, is_linear)
 
 
-def _crossings(image: Floats, tolerance: float) -> _Crossings:
-    """Return where the rows of an image cross its clean edges."""
+def _crossings(image: Floats, tolerance: float, *, of_lines: bool = False) -> _Crossings:
+    """Return where the rows of an image cross its clean edges; ``of_lines``: lines on a flat colour."""
     width = image.shape[1]
     same = channel_max(np.abs(np.diff(image, axis=1))) <= tolerance
     flat = np.zeros(image.shape[:2], np.bool_)
@@ -130,7 +147,8 @@ def _crossings(image: Floats, tolerance: float) -> _Crossings:
     near = (ends_rows[number] == rows) & (after - before <= WIDEST + 1)
     rows, before, after = rows[near], before[near], after[near]
     one, other = image[rows, before], image[rows, after]
-    step = channel_max(np.abs(other - one)) > EDGE
+    apart = channel_max(np.abs(other - one))
+    step = apart <= tolerance if of_lines else apart > EDGE
     rows, before, after, one, other = (each[step] for each in (rows, before, after, one, other))
     counts = after - before - 1
     columns = ranges(before + 1, counts)
@@ -149,17 +167,7 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
 
     The area beside an edge changes evenly from row to row, in the light in which colours were mixed.
     """
-    after = np.full((image.shape[0] + 2, image.shape[1] + 4), -1)
-    after[found.rows + 1, found.before + 2] = np.arange(len(found.rows))
-    beside = []
-    for down in (-1, 1):
-        number = np.full(len(found.rows), -1)
-        for right in (2, -2, 1, -1, 0):
-            other = after[found.rows + 1 + down, found.before + 2 + right]
-            same = [channel_max(np.abs(c - c[other])) <= tolerance for c in (found.one, found.other)]
-            is_next = (other >= 0) & same[0] & same[1]
-            number[is_next] = other[is_next]
-        beside.append(number)
+    beside = found.beside(image.shape, tolerance)
     known, bends = (beside[0] >= 0) & (beside[1] >= 0), []
     for values in (LINEAR, np.arange(256, dtype=np.float32)):
         one, other, pixels = (
@@ -177,3 +185,27 @@ def _votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int
     known &= np.maximum(*bends) * channel_max(np.abs(found.other - found.one)) > 2 * tolerance
     linear, gamma = (bend[known] for bend in bends)
     return int((linear < gamma).sum()), int((gamma < linear).sum())
+
+
+def _line_votes(image: Floats, found: _Crossings, tolerance: float) -> tuple[int, int]:
+    """Return how many crossings of lines say that colours were mixed in linear light, and how many in sRGB.
+
+    What a line takes from the ground is as much in each row, in the light in which colours were mixed.
+    """
+    beside = found.beside(image.shape, tolerance)
+    at = found.rows[found.owner], found.columns
+    bends = []
+    for values in (LINEAR, np.arange(256, dtype=np.float32)):
+        pixels, ground = (values[np.asarray(each, np.intp)] for each in (image[at], found.one[found.owner]))
+        sums = [np.bincount(found.owner, less, len(found.rows)) for less in (ground - pixels).T]
+        taken = np.stack(sums, axis=1).astype(np.float64)
+        size = np.maximum(_length(taken), 1)
+        bends.append(_length(taken[beside[0]] - 2 * taken + taken[beside[1]]) / size)
+    known = (beside[0] >= 0) & (beside[1] >= 0) & (size > EDGE)
+    known &= np.maximum(*bends) * size > 2 * tolerance
+    linear, gamma = (bend[known] for bend in bends)
+    return int((linear < gamma).sum()), int((gamma < linear).sum())
+
+
+def _length(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))

@@ -20,6 +20,7 @@ from warpsplat.drawing.chroma import halved, has_blurred_colors, with_sharp_colo
 from warpsplat.drawing.edges import LINEAR, MIDDLES, Edges, find_edges
 from warpsplat.drawing.trace.grids import Bools, Box, Floats, Ints, dilated, uneven_pixels
 from warpsplat.drawing.trace.seeds import ROUNDING, noise_of
+from warpsplat.fit.optics import COUNTS, RADIUS, RINGS, Kernel, Optics
 from warpsplat.portable.linear import solve
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
@@ -27,9 +28,6 @@ from warpsplat.scene.geometry import enlarged
 SCALE = 2
 """Samples of a sharp image along a pixel: coverage of whole pixels does not tell what Lanczos or bicubic
 filters leave of finer parts."""
-
-RADIUS = 5
-"""Samples of the kernel on each side of the middle of a pixel."""
 
 ROUNDS = 4
 """Solutions for a kernel, as each tells which pixels it would clip."""
@@ -47,18 +45,8 @@ which stay small then."""
 CLEAN = 16
 """Weight of clean edges: elsewhere, what a trace does not tell is taken for blur."""
 
-RINGS = [(a, b) for a in range(RADIUS) for b in range(a + 1)]
-"""Distances of the samples of one weight from the middle of a pixel, along the two sides in any order: 0 is
-the nearest. The kernel is symmetric to the axes and diagonals."""
-
-COUNTS = [4 if a == b else 8 for a, b in RINGS]
-"""How many samples those are."""
-
 LIGHTNESS = np.array([5, 9, 2], np.float32) / 16
 """Shares of the channels, about, in what JPEG keeps at full resolution (ITU-T T.871)."""
-
-Kernel = tuple[float, ...]
-"""A weight for the samples of each of RINGS; those of all samples add up to 1."""
 
 NONE = (1 / COUNTS[0], *(0.0,) * (len(RINGS) - 1))
 """Each pixel is the mean of its samples."""
@@ -91,21 +79,28 @@ class Seen:
     """Noise of flat colours [levels]."""
     is_halved: bool
     """Whether its colours have half the resolution of its lightness, and so do not tell the kernel."""
-    has_kernel: bool = True
-    """Whether there is a kernel to be found."""
+    kernel: Kernel | None = None
+    """Its kernel; None: to be found."""
 
     @classmethod
-    def of(cls, image: FloatArray, noise: float | None = None) -> Seen:
+    def of(cls, image: FloatArray, noise: float | None = None, known: Optics | None = None) -> Seen:
         """Return an image, sRGB in [0, 1], shape (height, width, 3), or premultiplied with opacity.
 
-        ``noise``: of flat colours [levels]; None: measured.
+        ``noise``: of flat colours [levels]; None: measured. ``known``: of how it was made.
         """
+        known = known or Optics()
         levels = _levels(image)
         noise = noise_of(levels) if noise is None else noise
         is_halved = has_blurred_colors(image)
         sharp = _levels(with_sharp_colors(image)) if is_halved else levels
-        edges, uneven = find_edges(sharp, noise), uneven_pixels(levels, ROUNDING + noise)
-        return cls(levels, uneven, edges, noise, is_halved)
+        is_linear = None if known.light is None else known.light == "linear"
+        edges, uneven = find_edges(sharp, noise, is_linear=is_linear), uneven_pixels(levels, ROUNDING + noise)
+        return cls(levels, uneven, edges, noise, is_halved, known.kernel)
+
+    @property
+    def known(self) -> Optics:
+        """How it was made, as far as that is decided."""
+        return Optics("linear" if self.edges.is_linear else "sRGB", self.kernel)
 
     def part(self, box: Box) -> Seen:
         """Return a part of it."""
@@ -164,9 +159,11 @@ class Seen:
         def left(tried: Kernel) -> float:
             return _squared(self._planes(self._residual(self.in_srgb(_summed(tried, rings)), steps, some)))
 
+        if self.kernel is not None:
+            return self.kernel, left(self.kernel)
         kernel, error = NONE, left(NONE)
         told = int(((light > 0) & (light < 255)).sum())
-        for _ in range(ROUNDS if self.has_kernel and told > len(table) else 0):
+        for _ in range(ROUNDS if told > len(table) else 0):
             # Sums of products of whole numbers are exact, and so the same in any order.
             weighted = table * weight
             normal = np.array([[(one * other).sum() for one in weighted] for other in table])

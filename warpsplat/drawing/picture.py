@@ -13,6 +13,7 @@ from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.drawing.trace.seeds import noise_of
+from warpsplat.fit.optics import Optics
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
@@ -47,8 +48,8 @@ class Picture:
 
     seen: FloatArray | None = None
     """The pixels before they were made sharp, if they were."""
-    has_kernel: bool = False
-    """Whether they were blurred or sharpened by a kernel."""
+    optics: Optics | None = None
+    """How they were made, if they were blurred, sharpened or mixed in linear light."""
     is_halved: bool = False
     """Whether its colours had half the resolution of its lightness, and were made sharp; flat colours have
     noise then."""

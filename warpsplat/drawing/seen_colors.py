@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.drawing.optics import RIDGE, Kernel, Seen
+from warpsplat.drawing.optics import RIDGE, Seen
 from warpsplat.drawing.trace.grids import Floats, channel_max
 from warpsplat.drawing.trace.seeds import ROUNDING
+from warpsplat.fit.optics import Kernel
 from warpsplat.portable.linear import product, solve
 from warpsplat.scene import FloatArray, Paint, Scene
 

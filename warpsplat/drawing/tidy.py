@@ -20,6 +20,7 @@ from warpsplat.drawing.optics import Seen
 from warpsplat.drawing.prices import LEAST_ERROR, worth
 from warpsplat.drawing.seen_colors import with_seen_colors
 from warpsplat.drawing.shapes import shape_changes
+from warpsplat.fit.optics import Optics
 from warpsplat.fit.problem import Run
 from warpsplat.metrics import decibels
 from warpsplat.rendering.renderer import render
@@ -60,7 +61,7 @@ def finish_drawing(
     grid: float | None = None,
     negligible: float = LEAST_ERROR,
     seen: FloatArray | None = None,
-    has_kernel: bool = True,
+    optics: Optics | None = None,
 ) -> Finished:
     """Refine a traced drawing, remove nodes, and round it.
 
@@ -77,12 +78,12 @@ def finish_drawing(
         negligible: mean squared error below which differences do not count.
         seen: the image before it was made sharp, if ``target`` was: the drawing is fitted so that it is like
             that through the optics, of which both tell more and more. The PSNR is NaN then.
-        has_kernel: whether a kernel is among these optics.
+        optics: what is known of these.
     """
     target = matching(target, drawing.scene.canvas)
-    optics = None
+    picture = None
     if seen is not None:
-        optics = replace(Seen.of(matching(seen, drawing.scene.canvas)), has_kernel=has_kernel)
+        picture = Seen.of(matching(seen, drawing.scene.canvas), known=optics)
     if run.over() or not len(drawing.scene):
         return Finished(drawing, grid or min(DRAFT_GRID, finest))
     byte = partial(worth, price=price, negligible=negligible)
@@ -90,12 +91,12 @@ def finish_drawing(
     fit = OutlineFit(target, drawing, run)
     fit.advance(parts[0], FIRST_STEPS, FAR)
     _roam(fit, target, run, FIRST_ROAM, negligible)
-    fit, target = _through_optics(fit, target, parts[0], optics)
+    fit, target = _through_optics(fit, target, parts[0], picture)
     if tidy and not run.over():
         fit = OutlineFit(target, tidied(fit, byte, run.over), run)
         fit.advance(parts[1], SECOND_STEPS, FAR)
         _roam(fit, target, run, SECOND_ROAM, negligible)
-        fit, target = _through_optics(fit, target, parts[1], optics)
+        fit, target = _through_optics(fit, target, parts[1], picture)
     equal: list[Equal] = []
     if tidy and not run.over():
         exact, worth_of_byte = fit.drawing, byte(fit.error, estimated_size(fit.drawing.scene, DRAFT_GRID))

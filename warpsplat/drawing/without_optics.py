@@ -5,14 +5,17 @@ A trace tells the optics better than the one before, and what they leave of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from warpsplat.drawing.constraints import DRAFT_GRID
 from warpsplat.drawing.optics import Found, Seen
 from warpsplat.drawing.trace.grids import Bools, Box
+from warpsplat.fit.optics import Optics
 from warpsplat.fit.rounding import DB_PER_DOUBLING
 from warpsplat.portable.elementary import log10
 from warpsplat.scene import FloatArray, Scene
@@ -47,6 +50,20 @@ class HasScene(Protocol):
 Traced = TypeVar("Traced", bound=HasScene)
 
 
+@dataclass(frozen=True, eq=False)
+class Undone(Generic[Traced]):
+    """A picture as it was before optics."""
+
+    pixels: FloatArray
+    """As the picture's."""
+    traced: Traced
+    """Their trace."""
+    optics: Optics | None = None
+    """What is known of the optics; None: there are none, the pixels are the picture's."""
+    cost: float = math.inf
+    """What the error and the size of the trace cost with them [dB]."""
+
+
 def without_optics(
     pixels: FloatArray,
     noise: float | None,
@@ -54,7 +71,8 @@ def without_optics(
     show: Callable[[Scene], FloatArray],
     over: Callable[[], bool],
     halved: FloatArray | None = None,
-) -> tuple[FloatArray, Traced]:
+    known: Optics | None = None,
+) -> Undone[Traced]:
     """Return pixels as they were before they were blurred or sharpened, and their trace.
 
     Args:
@@ -64,34 +82,48 @@ def without_optics(
         show: Renders a scene, likewise.
         over: Returns whether there is no time left.
         halved: The pixels before their colours were made as sharp as their lightness, if they were.
+        known: Of how they were made.
 
     Returns:
         ``pixels`` itself if no optics explain it clearly better than its trace does.
     """
-    seen = Seen.of(pixels if halved is None else halved, noise)
-    first = pixels, trace(pixels)
-    if not (seen.edges.has_rings or seen.edges.is_linear):
+    known = known or Optics()
+    image = pixels if halved is None else halved
+    seen = Seen.of(image, noise, known)
+    first = linear = Undone(pixels, trace(pixels))
+    if known.is_certain:
+        return _undone(seen, first, trace, show, over, is_certain=True)
+    if seen.edges.is_linear:
+        # That edges look so is not enough: in the right light, a trace explains the picture far better.
+        linear = _undone(seen, first, trace, show, over)
+        seen = Seen.of(image, noise, Optics("sRGB"))
+    if not seen.edges.has_rings:
         box = _busiest(seen.uneven)
         part, some = seen.part(box), pixels[box.slices()]
-        found = part.find(*(show(scene) for scene in part.scenes(first[1].scene, box)))
+        found = part.find(*(show(scene) for scene in part.scenes(first.traced.scene, box)))
         if found.error >= LIKELY * found.without or over():
-            return first
+            return linear
         # Of a large picture, a part tells in less time whether there is a kernel.
         is_large = pixels.size > PARTS * some.size
-        if is_large and _undone(part, (some, trace(some)), trace, show, over, 1)[0] is some:
-            return first
-    return _undone(seen, first, trace, show, over)
+        if is_large and not _undone(part, Undone(some, trace(some)), trace, show, over, turns=1).optics:
+            return linear
+    return min(linear, _undone(seen, first, trace, show, over), key=lambda each: each.cost)
 
 
 def _undone(
     seen: Seen,
-    first: tuple[FloatArray, Traced],
+    first: Undone[Traced],
     trace: Callable[[FloatArray], Traced],
     show: Callable[[Scene], FloatArray],
     over: Callable[[], bool],
+    *,
     turns: int = TURNS,
-) -> tuple[FloatArray, Traced]:
-    """Return pixels without the optics of a picture, and their trace; the ``first`` if that is not better."""
+    is_certain: bool = False,
+) -> Undone[Traced]:
+    """Return a picture without its optics; the ``first``, without any, if that is not clearly better.
+
+    ``is_certain``: better or not.
+    """
 
     def look(traced: Traced) -> tuple[Found, float]:
         """Return the optics of the trace, and what its error and its size cost with them [dB]."""
@@ -101,8 +133,8 @@ def _undone(
     if over():
         return first
     best = first
-    found, _ = look(first[1])
-    usual = _cost(found.without, first[1].scene)
+    found, _ = look(first.traced)
+    usual = math.inf if is_certain else _cost(found.without, first.traced.scene)
     bound = clearly = usual + 10 * float(log10(CLEARLY))
     if seen.edges.has_rings or seen.edges.is_linear:
         plain = seen.plain()
@@ -111,7 +143,7 @@ def _undone(
         if seen.edges.is_linear:
             if cost > usual + 10 * float(log10(MOVED)):
                 return first
-            bound, best = cost, (plain, traced)
+            bound, best = cost, Undone(plain, traced, seen.known, cost)
     for turn in range(turns):
         # Traces explain more from turn to turn, even through optics that the picture never had.
         if over() or (turn > 1 and bound > usual):
@@ -121,7 +153,7 @@ def _undone(
         found, cost = look(traced)
         if cost >= bound:
             break
-        bound, best = cost, (current, traced)
+        bound, best = cost, Undone(current, traced, seen.known, cost)
     return best if bound <= clearly else first
 
 

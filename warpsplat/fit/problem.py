@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from warpsplat.errors import DeviceError, Stopped
 from warpsplat.fit.checkpoint import Checkpoint
 from warpsplat.fit.custom_loss import CustomLoss
+from warpsplat.fit.optics import Optics
 from warpsplat.fit.progress import Callback, Progress
 from warpsplat.fit.settings import Settings
 from warpsplat.scene import FloatArray, Scene
@@ -180,5 +181,5 @@ class Fit:
     interrupted: bool
     renewed: int = 0
     """How often a shape was reset because of a number that was not finite."""
-    is_sharper: bool = False
-    """Whether it is what the image was before it was blurred, sharpened or mixed in linear light."""
+    optics: Optics | None = None
+    """How the image was made of it, as far as it is known; None: it is as sharp as the image."""

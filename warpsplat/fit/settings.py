@@ -14,6 +14,7 @@ import numpy as np
 from warpsplat.errors import UsageError, shown
 from warpsplat.extensions import load_renderer, renderer_names
 from warpsplat.field_docs import described
+from warpsplat.fit import optics as how
 from warpsplat.fit.options import (
     COLOR,
     COLOR_NAMES,
@@ -36,7 +37,6 @@ Quality = Literal["draft", "balanced", "high"]
 Order = Literal["age", "area"]
 Subject = Literal["auto", "photo", "drawing", "line", "pixel", "silhouette"]
 Painting = Literal["flat", "linear", "radial", "auto"]
-OpticsChoice = Literal["auto", "none"]
 Stack = Literal["overlap", "cutout"]
 Removal = Literal["outside", "everywhere"]
 LossName = Literal["l2", "ssim", "edges"]
@@ -353,9 +353,15 @@ class Settings:
         group="Drawings",
         common=True,
     )
-    optics: OpticsChoice = option(
+    optics: str = option(
         "auto",
-        "auto: undo what a scan, a filter or resizing did to the edges of a drawing.",
+        "What a scan, a filter or resizing did to the edges of a drawing, to be undone.",
+        pattern=how.PATTERN,
+        wanted=how.WANTED,
+        metavar="HOW",
+        values=how.WORDS,
+        files=True,
+        parse=how.parse_optics,
         **DRAWN,
         group="Drawings",
     )

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from warpsplat.drawing.optics import RADIUS, RINGS, SCALE, Seen
+from warpsplat.drawing.optics import SCALE, Seen
 from warpsplat.fit.export import finished, shown_image
+from warpsplat.fit.optics import RADIUS, RINGS
 from warpsplat.fit.problem import Fit, Problem
 from warpsplat.portable.elementary import log10
 from warpsplat.scene import FloatArray
@@ -42,7 +43,7 @@ class Explained:
 
 def explained(made: Fit, problem: Problem) -> Explained:
     """Return how the image of a problem was made of a drawing."""
-    seen, target = Seen.of(problem.target), problem.target
+    seen, target = Seen.of(problem.target, known=made.optics), problem.target
     images = [
         shown_image(finished(scene, problem.settings, made.per_pixel / SCALE), scene, target.shape[2])
         for scene in seen.scenes(made.scene)

@@ -8,12 +8,13 @@ from typing import Any
 
 from warpsplat.errors import UsageError, printable
 from warpsplat.extensions import declared, load
+from warpsplat.fit.optics import WORDS
 from warpsplat.fit.options import QUOTED, Option, options_of, parse_palette
 from warpsplat.fit.settings import Density, Settings, default_rates, make_settings
 from warpsplat.scene import Kind
 
-PALETTE_BYTES = 10_000
-"""Most that is read of a file with colours."""
+MOST_BYTES = 10_000
+"""Most that is read of a file with the value of an option."""
 
 _declared = [each for made in options_of(Settings) for each in (*made.shorthands, made) if each.help]
 
@@ -35,21 +36,22 @@ RESEARCH_KEYS: tuple[str, ...] = tuple(o.name for o in _declared if o.research a
 """Further keys of batch files, of single values."""
 
 
-def read_palette(path: Path) -> str:
-    """Read the colours in a text file; raise ``UsageError`` if it cannot be read, or is too long."""
+def read_value(name: str, path: Path, others: str) -> str:
+    """Read the value of an option in a text file.
+
+    Raises ``UsageError`` if it cannot be read or is too long; ``others``: which values are no files.
+    """
     try:
         with path.open("rb") as file:
-            found = file.read(PALETTE_BYTES + 1)
-        if len(found) > PALETTE_BYTES:
-            raise UsageError(f"palette {printable(str(path))}: has more than {PALETTE_BYTES} bytes")
+            found = file.read(MOST_BYTES + 1)
+        if len(found) > MOST_BYTES:
+            raise UsageError(f"{name} {printable(str(path))}: has more than {MOST_BYTES} bytes")
         return found.decode("ascii")
     except (OSError, ValueError) as error:
         cause = error.strerror if isinstance(error, OSError) else "not text"
         if isinstance(error, UnicodeEncodeError) or "\0" in str(path):
             cause = "contains a character that file names cannot have"
-        raise UsageError(
-            f"palette {printable(str(path))}: {cause}; colours are names, or such as '#f80' {QUOTED}"
-        ) from error
+        raise UsageError(f"{name} {printable(str(path))}: {cause}; {others}") from error
 
 
 def preset_names() -> Sequence[str]:
@@ -73,11 +75,14 @@ def with_preset(preset: str | None, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
-    """Return ``make_settings`` of keywords in which a palette may be the name of a file."""
-    palette = given.get("palette")
+    """Return ``make_settings`` of keywords in which a palette and optics may be the names of files."""
+    palette, optics = given.get("palette"), given.get("optics")
     if isinstance(palette, str) and palette.strip() and "#" not in palette:
         try:
             parse_palette(palette)  # names of colours
         except UsageError:
-            given = {**given, "palette": read_palette(Path(palette))}
+            others = f"colours are names, or such as '#f80' {QUOTED}"
+            given = {**given, "palette": read_value("palette", Path(palette), others)}
+    if isinstance(optics, str) and optics.endswith(".json"):
+        given = {**given, "optics": read_value("optics", Path(optics), f"others are {', '.join(WORDS)}")}
     return make_settings(**given)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypedDict
 
 from warpsplat.fit.custom_loss import CustomLoss, LossFunction
 from warpsplat.fit.settings import (
     DxfCurves,
     LossName,
-    OpticsChoice,
     Painting,
     Quality,
     Removal,
@@ -59,7 +58,7 @@ class Options(RefineOptions, total=False):
     max_bytes: int | str | None
     max_memory: int | str | None
     detail: float | None
-    optics: OpticsChoice | None
+    optics: Mapping[str, object] | str | None
     seed: int | None
     remove_background: Removal | None
     size: str | None

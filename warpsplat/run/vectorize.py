@@ -134,7 +134,7 @@ def make_result(
         problem, reduction = image.problem, image.reduction
         target, settings = problem.target, problem.settings
         report_end(made, run, history)
-        optics = explained(made, problem) if made.is_sharper and not made.interrupted else None
+        optics = explained(made, problem) if made.optics and not made.interrupted else None
         made = _arranged(made, problem, strategy, run)
         if checkpoint and made.interrupted:
             checkpoint.save()

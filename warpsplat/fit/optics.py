@@ -1,0 +1,107 @@
+"""What is known of how an image was made of sharp shapes, and how users say it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from warpsplat.errors import UsageError, shown
+
+Light = Literal["sRGB", "linear"]
+"""In which colours are mixed."""
+
+RADIUS = 5
+"""Samples of a kernel on each side of the middle of a pixel."""
+
+RINGS = [(a, b) for a in range(RADIUS) for b in range(a + 1)]
+"""Distances of the samples of one weight from the middle of a pixel, along the two sides in any order: 0 is
+the nearest. Kernels are symmetric to the axes and diagonals."""
+
+COUNTS = [4 if a == b else 8 for a, b in RINGS]
+"""How many samples those are."""
+
+Kernel = tuple[float, ...]
+"""A weight for the samples of each of RINGS; those of all samples add up to 1."""
+
+WORDS = ("auto", "none", *get_args(Light))
+"""Values of the option that are words."""
+
+WANTED = f"{', '.join(WORDS)} or a report.json"
+"""Values of the option, in words."""
+
+PATTERN = rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})( [-+.e\d]+){{{len(RINGS)}}}"
+"""Values of the option, as ``parse_optics`` returns them."""
+
+
+@dataclass(frozen=True)
+class Optics:
+    """What is known of how an image was made of sharp shapes; None: to be found."""
+
+    light: Light | None = None
+    kernel: Kernel | None = None
+
+    @classmethod
+    def of(cls, text: str) -> Optics:
+        """Return what a value of ``parse_optics`` says is known."""
+        light, *kernel = text.split()
+        given = light if light in get_args(Light) else None
+        return cls(given, tuple(map(float, kernel)) or None)  # type: ignore[arg-type]
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether an image is to be drawn as it was without them, however well they explain it."""
+        return self.light == "linear" or self.kernel is not None
+
+
+def parse_optics(value: Any) -> str:
+    """Return a word, or optics as those of a report, as a text: the light and the weights of the kernel.
+
+    Raises ``UsageError`` for anything else.
+    """
+    if isinstance(value, Mapping):
+        return _text(value)
+    if isinstance(value, str) and value.lstrip().startswith("{"):
+        try:
+            return _text(json.loads(value))
+        except ValueError as error:
+            raise UsageError(f"optics must be {WANTED}, not {shown(value)}") from error
+    return str(value)
+
+
+def _text(given: Mapping[str, Any]) -> str:
+    """Return optics as a text: ``{"light": "linear", "kernel": [[...], ...]}``, or a report that has them."""
+    given = given.get("optics", given)
+    if not isinstance(given, Mapping) or not given.keys() & {"light", "kernel"}:
+        raise UsageError("optics must have a light, sRGB or linear, a kernel, or both")
+    light, kernel = given.get("light", "sRGB"), given.get("kernel")
+    if light not in get_args(Light):
+        raise UsageError(f"the light of optics must be sRGB or linear, not {shown(light)}")
+    if kernel is None:
+        return str(light)
+    return " ".join([light, *map(repr, _weights(kernel))])
+
+
+def _weights(kernel: Any) -> Kernel:
+    """Return the weights of a kernel's RINGS, which is a quarter of it, shape (RADIUS, RADIUS)."""
+    rows = [row for row in kernel if _is_list(row)] if _is_list(kernel) else []
+    numbers = [each for row in rows for each in row if _is_number(each)]
+    if [len(row) for row in rows] != [RADIUS] * RADIUS or len(numbers) != RADIUS * RADIUS:
+        raise UsageError(f"the kernel of optics must be {RADIUS} rows of {RADIUS} numbers, as in a report")
+    if any(rows[a][b] != rows[b][a] for a, b in RINGS):
+        raise UsageError("the kernel of optics must be the same across and down")
+    weights = [float(rows[a][b]) for a, b in RINGS]
+    total = sum(n * w for n, w in zip(COUNTS, weights, strict=True))
+    if abs(total - 1) > 0.01:
+        raise UsageError(f"the weights of the kernel of optics must add up to 1/4, not {total / 4:.4g}")
+    return tuple(weight / total for weight in weights)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
