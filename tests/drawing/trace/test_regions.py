@@ -11,10 +11,11 @@ import pytest
 
 from tests.drawing.trace.drawings import as_file, decibels, draw, draw_exactly, ground, levels, star
 from warpsplat.drawing.trace.fewer import _merge, fewer_regions
-from warpsplat.drawing.trace.grids import components, nearest_in, nearest_of
-from warpsplat.drawing.trace.palette import Coloring
+from warpsplat.drawing.trace.grids import NO_REGION, components, nearest_in, nearest_of
+from warpsplat.drawing.trace.palette import Coloring, Parts
 from warpsplat.drawing.trace.partition import find_partition
 from warpsplat.drawing.trace.regions import Regions, find_regions
+from warpsplat.drawing.trace.thin_parts import _with_distant_pixels
 from warpsplat.drawing.trace.trace import trace
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray
@@ -185,6 +186,17 @@ def test_the_ground_between_lines_of_a_mesh_stays() -> None:
     paper = [216, 210, 176, 255]
     is_paper, shown = (np.abs(each - paper).max(axis=2) <= 8 for each in (image, colors))
     assert shown[is_paper].mean() > 0.9
+
+
+def test_far_ground_is_where_squares_of_pixels_show_it() -> None:
+    """A line of pixels that has its colour is a mixture of others by chance."""
+    image = np.full((24, 40, 3), 90, np.float32)
+    image[:, :4] = image[10:12, 20:22] = image[4, 16:30] = 200
+    labels = np.full((24, 40), NO_REGION, np.int32)
+    labels[:, :4] = 0
+    parts = Parts(labels, image.copy(), np.zeros(1, np.int32), [Coloring(image[0, 0])])
+    found = _with_distant_pixels(image, parts, 8.0).labels != labels
+    assert found[10:12, 20:22].all() and found.sum() == 4
 
 
 def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:
