@@ -52,7 +52,7 @@ def test_the_size_is_that_of_the_option_or_the_file(
     result = made(image, **options)
     assert size(result) == size(made(Image.open(io.BytesIO(image)), **options)) == wanted
     if options == {"units": "mm"}:
-        assert result.notes[-1] == "12x8 mm: 254 pixels an inch, by the image file"
+        assert result.notes[-1] == "12x8 mm: 254 pixels per inch, by the image file"
     if options == {"units": "in"}:
         assert "--dpi" in result.notes[-1]
 
@@ -65,7 +65,7 @@ def test_pixels_stay_pixels() -> None:
 
 
 def test_pixels_that_are_no_squares() -> None:
-    """A fax: twice as many pixels an inch across as down."""
+    """A fax: twice as many pixels per inch across as down."""
     text = made(drawing(dpi=(254, 127)), units="mm").svg
     assert text.startswith('<svg xmlns="http://www.w3.org/2000/svg" width="12mm" height="16mm" preserve')
     shown = np.asarray(warpsplat.render(text, renderer="viewer"))[..., 0]

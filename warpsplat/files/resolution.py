@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from PIL import ExifTags, Image
 
 RANGE = (1.0, 1e6)
-"""Resolutions that are taken seriously [pixels an inch], from a pixel an inch to a tenth of a wavelength."""
+"""Resolutions that are taken seriously [pixels per inch], from a pixel an inch to a tenth of a wavelength."""
 
 PER_INCH = {2: 1.0, 3: 2.54}
 """Inches over the unit of a resolution, by EXIF's and TIFF's numbers of inches and centimetres."""
@@ -53,7 +53,7 @@ def _in_exif(exif: Image.Exif) -> Resolution | None:
     """Return the resolution in EXIF."""
     sides = exif.get(ExifTags.Base.XResolution), exif.get(ExifTags.Base.YResolution)
     found = _valid(sides, PER_INCH.get(exif.get(ExifTags.Base.ResolutionUnit, DEFAULT_UNIT)))
-    unknown = 72.0  # the resolution that the EXIF standard prescribes where none is known [pixels an inch]
+    unknown = 72.0  # the resolution that the EXIF standard prescribes where none is known [pixels per inch]
     return None if found == (unknown, unknown) else found
 
 

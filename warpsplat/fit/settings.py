@@ -414,7 +414,7 @@ class Settings:
     )
     dpi: float | None = option(
         None,
-        "Resolution of the image in pixels an inch, for its size in the file.",
+        "Resolution of the image in pixels per inch, for its size in the file.",
         (1, 1e6),
         shown_default="that in the image file, else 96",
         metavar="N",

@@ -50,7 +50,7 @@ class Paper:
             return ()
         size = "x".join(self.sheet.lengths()) + f" {self.sheet.unit}"
         x, y = (f"{each:.5g}" for each in self.resolution)
-        return (f"{size}: {x if x == y else f'{x} and {y}'} pixels an inch, {self.where_from}",)
+        return (f"{size}: {x if x == y else f'{x} and {y}'} pixels per inch, {self.where_from}",)
 
     @property
     def sheet(self) -> Sheet:

@@ -53,7 +53,7 @@ class PreparedImage:
     name: str = "the image"
     """Its name in messages."""
     resolution: tuple[float, float] | None = None
-    """That its file states [pixels an inch along x and y]."""
+    """That its file states [pixels per inch along x and y]."""
 
     @property
     def size(self) -> tuple[int, int]:

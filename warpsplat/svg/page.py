@@ -131,7 +131,7 @@ def checked_unit(unit: str) -> str:
 def natural_sheet(width: int, height: int, resolution: tuple[float, float], unit: str) -> Sheet:
     """Return a sheet of a picture's own size [px], in a unit as ``sheet_for``.
 
-    ``resolution``: pixels an inch along x and y, without effect on a size in ``px``.
+    ``resolution``: pixels per inch along x and y, without effect on a size in ``px``.
     """
     unit = checked_unit(unit)
     across, down = (PIXELS_AN_INCH, PIXELS_AN_INCH) if unit == "px" else resolution
