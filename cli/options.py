@@ -72,7 +72,10 @@ preset_option = option_in(
 )
 
 overwrite_option = option_in(
-    "Files", "--overwrite", is_flag=True, help="Also replace files that warpsplat did not write."
+    "Files",
+    "--overwrite",
+    is_flag=True,
+    help="Replace other programs' files, too; its own always are.",
 )
 
 

@@ -205,7 +205,7 @@ def test_a_dry_run_writes_nothing(folder: Path, cli: Cli) -> None:
     assert not (folder / "out").exists()
     assert run("batch", path, "-q") == 5
     before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
-    captured = cli("batch", path, "--dry-run", "--set", "seed=0")
+    captured = cli("batch", path, "--dry-run", "--set", "seed=0", code=5)
     assert "already made with these settings" in captured.out
     assert "broken.png: not an image" in captured.err
     assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before

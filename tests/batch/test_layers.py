@@ -99,6 +99,7 @@ def test_names_of_results(folder: Path, output: str, made: str) -> None:
         ("rates=3", "unknown key 'rates'"),
         ("rates.pints=3", "unknown key 'rates.pints'"),
         ("curves.x=3", "unknown key 'curves.x'"),
+        ("dry-run=true", "unknown key 'dry-run'"),
         ("curves=0", "--set curves=0: "),
         ("curves=[", "is not plain YAML"),
         ("curves=", "has no value"),
@@ -222,6 +223,9 @@ def test_the_command_line(image: Path, tmp_path: Path, cli: Cli) -> None:
     own.write_text("shape: circle\ncurve: 99\n", "utf-8")
     said = cli("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick, code=2).line
     assert "mine.yaml:2: unknown key 'curve'" in said
+    own.write_text("report: pages\n", "utf-8")
+    said = cli("vectorize", image, "-o", tmp_path / "d.svg", "--preset", own, *quick, code=2).line
+    assert "mine.yaml:1: unknown key 'report'" in said and "option of the command line, --report" in said
 
 
 def test_batch_files_know_them(folder: Path) -> None:

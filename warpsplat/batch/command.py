@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpsplat.batch.options import BatchOptions, batch_options
+from warpsplat.batch.options import batch_options
+from warpsplat.batch.run_options import BatchOptions
 from warpsplat.cli.echo import echo
 from warpsplat.cli.help import GroupedCommand
 from warpsplat.errors import ExitCode, UsageError
@@ -46,7 +47,7 @@ def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **give
       - images: [logo.png, icons/*.png]
         curves: 64
 
-    Its paths are relative to it. What the command line says is stronger.
+    Its paths are relative to it. Options on the command line override the file.
     """  # noqa: D301
     options = {each.name: given.pop(each.name) for each in fields(BatchOptions) if each.name in given}
     given = with_preset(given.pop("preset"), given)
@@ -152,7 +153,7 @@ def perform(
                 if reports:
                     write_index(reports, planned, outcomes, manifest)
     display.finish(time.monotonic() - begun, executor.workers, manifest.path)
-    if not options.dry_run and (display.failures or display.missed):
+    if display.failures or display.missed:
         sys.exit(ExitCode.SOME_FAILED if display.failures else ExitCode.GOAL_MISSED)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from warpsplat.batch.run_options import BatchOptions
 from warpsplat.errors import ImageError, UsageError, cut, shown
 from warpsplat.files.inputs import read_input
 from warpsplat.fit.options import nearest
@@ -17,6 +19,9 @@ from warpsplat.run.options import BY_NAME, RESEARCH_KEYS
 
 MAX_FILE = 1 << 20
 """Largest batch file [bytes]: a mebibyte of YAML takes seconds to read."""
+
+ELSEWHERE = {field.name.replace("_", "-") for field in fields(BatchOptions)} - {"as-json"}
+"""Options that are of the command line alone."""
 
 
 class BatchFile:
@@ -67,7 +72,8 @@ class BatchFile:
             line = key_node.start_mark.line + 1
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else "[...]"
             if key not in allowed:
-                hint = nearest(key, allowed) or f"; known are {_listed(allowed)}"
+                hint = f"; it is an option of the command line, --{key}" if key in ELSEWHERE else ""
+                hint = hint or nearest(key, allowed) or f"; known are {_listed(allowed)}"
                 raise self.error(line, f"unknown key {shown(key)} in {where}{hint}")
             if key in result:
                 raise self.error(line, f"key {shown(key)} is there twice in {where}")

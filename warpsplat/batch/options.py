@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import click
@@ -23,27 +21,6 @@ from warpsplat.cli.options import (
 )
 from warpsplat.errors import shown
 from warpsplat.extensions import extensions
-
-
-@dataclass(frozen=True)
-class BatchOptions:
-    """Options of a batch that do not change its results."""
-
-    overwrite: bool = False
-    retry_failed: bool = False
-    dry_run: bool = False
-    workers: int | None = None
-    threads: int | None = None
-    executor: str | None = None
-    """``ray`` or ``ray=ADDRESS``; None: this machine."""
-    gpus: float | None = None
-    """GPUs of a cluster that each image takes."""
-    shard: tuple[int, int] = (1, 1)
-    manifest: Path | None = None
-    report: Path | None = None
-    """Folder of pages on the results, or the page that lists them."""
-    quiet: bool = False
-    as_json: bool = False
 
 
 class Shard(click.ParamType):
@@ -116,7 +93,7 @@ batch_options = together(
         "--gpus",
         type=click.FloatRange(min=0, min_open=True, max=64),
         metavar="G",
-        help="What an image takes of a cluster's GPUs: 0.25 for four that share one.  [default: 1]",
+        help="GPUs of the cluster per image: with 0.25, four share one.  [default: 1]",
     ),
     option_in("Batch", "--shard", type=Shard(), default=(1, 1), help="Do part I of N of the images: 1/4."),
     option_in(

@@ -29,7 +29,7 @@ Kernel = tuple[float, ...]
 WORDS = ("auto", "none", *get_args(Light))
 """Values of the option that are words."""
 
-WANTED = f"{', '.join(WORDS)} or a report.json"
+WANTED = f"{', '.join(WORDS)} or a report.json of --json"
 """Values of the option, in words."""
 
 PATTERN = rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})( [-+.e\d]+){{{len(RINGS)}}}"

@@ -355,7 +355,8 @@ class Settings:
     )
     optics: str = option(
         "auto",
-        "What a scan, a filter or resizing did to the edges of a drawing, to be undone.",
+        "Undo what a scan, a filter or resizing did to the edges of a drawing: auto, none, sRGB or linear "
+        "light, or as in a report.json of --json.",
         pattern=how.PATTERN,
         wanted=how.WANTED,
         metavar="HOW",

@@ -29,11 +29,11 @@ class Explained:
 
     def words(self) -> str:
         """Return a sentence for people."""
-        how = "softened" if 4 * self.kernel[0][0] <= 1 else "sharpened"
-        made = "had its colours mixed in linear light" if self.light == "linear" else f"was {how}"
+        how = "blurred" if 4 * self.kernel[0][0] <= 1 else "sharpened"
+        how = "mixed in linear light" if self.light == "linear" else how
         return (
-            f"after it was drawn, the image {made}; through that, the file explains it to {self.psnr:.1f} dB "
-            "(optics 'none' draws it as it is)"
+            f"the image looks {how}, and is drawn as it was before; {how} in the same way, the file matches "
+            f"it to {self.psnr:.1f} dB (optics 'none' draws the edges that it has)"
         )
 
     def as_dict(self) -> dict[str, Any]:

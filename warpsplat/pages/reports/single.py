@@ -213,6 +213,7 @@ def notes(facts: Facts) -> list[str]:
         )
     if facts.kept:
         found.append(f"Kept unchanged: {facts.kept}.")
+    found += [f"{note[:1].upper()}{note[1:]}." for note in figures.get("notes") or ()]
     missed = figures.get("missed")
     found += [f"Goal missed: {goal}." for goal in (missed if isinstance(missed, (list, tuple)) else ())]
     return found
