@@ -91,7 +91,7 @@ def without_optics(
     image = pixels if halved is None else halved
     seen = Seen.of(image, noise, known)
     first = linear = Undone(pixels, trace(pixels))
-    if known.is_certain:
+    if known.kernel is not None or (known.light and seen.edges.is_linear):
         return _undone(seen, first, trace, show, over, is_certain=True)
     if seen.edges.is_linear:
         # That edges look so is not enough: in the right light, a trace explains the picture far better.

@@ -50,11 +50,6 @@ class Optics:
         given = light if light in get_args(Light) else None
         return cls(given, tuple(map(float, kernel)) or None)  # type: ignore[arg-type]
 
-    @property
-    def is_certain(self) -> bool:
-        """Whether an image is to be drawn as it was without them, however well they explain it."""
-        return self.light == "linear" or self.kernel is not None
-
 
 def parse_optics(value: Any) -> str:
     """Return a word, or optics as those of a report, as a text: the light and the weights of the kernel.
