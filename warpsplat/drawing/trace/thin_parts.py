@@ -20,6 +20,7 @@ TRIED = 32  # colours of pixels, and pairs of these and what is beside, from whi
 PARALLEL = 0.01  # squared sine of the angle below which two mixtures do not tell where they meet
 WITHIN = 0.03  # what a squared error within the limit counts for, over one beyond it
 EQUAL = 0.25  # of the limit: mixtures that are less off are as good as exact
+FEWEST = 4  # pixels of 3x3 that have the colour of a distant region, so that it is no chance
 SAMPLES, BLOCK = 1 << 16, 32  # pixels by which inks are judged, about, in blocks of so many along a side
 
 
@@ -78,12 +79,10 @@ def _with_distant_pixels(image: Floats, parts: Parts, limit: float) -> Parts:
     if not len(far[0]):
         return parts
     nearest = np.unravel_index(nearest_in(known)[far], known.shape)
-    found = np.zeros(known.shape, np.uint8)
+    found = np.zeros(known.shape)
     found[far] = channel_max(np.abs(image[far] - parts.fills[nearest])) <= limit
-    # Pixels that are not in a square of such ones may be mixtures of that colour by chance.
-    square = np.ones((2, 2), np.uint8)
-    whole = cv2.erode(found, square, anchor=(0, 0))  # at the upper left pixel of each square
-    alike = cv2.dilate(whole, square, anchor=(1, 1))[far] > 0
+    # Lone pixels may be mixtures of that colour by chance.
+    alike = (found[far] > 0) & (filters.box_sum(found, 3)[far] >= FEWEST)
     labels, fills = parts.labels.copy(), parts.fills.copy()
     own, source = ((rows[alike], columns[alike]) for rows, columns in (far, nearest))
     labels[own], fills[own] = labels[source], fills[source]
