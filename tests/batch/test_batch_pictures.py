@@ -64,7 +64,7 @@ def test_foreign_pictures_are_not_replaced(folder: Path, cli: Cli) -> None:
     Image.new("RGB", (9, 9)).save(theirs)
     before = theirs.read_bytes()
     arguments = ("batch", folder / "in" / "a.png", "-o", folder / "out" / "{stem}.png", *SMALL)
-    assert "other names (output), or --overwrite" in cli(*arguments, code=2).err
+    assert "--overwrite replaces them" in cli(*arguments, code=2).err
     assert theirs.read_bytes() == before
     assert run(*arguments, "--overwrite", "-q") == 0
     assert may_replace(theirs)

@@ -167,6 +167,8 @@ def test_optics_are_words_or_those_of_a_report(tmp_path: Path) -> None:
         ("report.json", "report.json: No such file"),
         ("{", "optics must be auto, none, sRGB, linear or a report.json"),
         ({"optics": None}, "must have a light"),
+        ('{"light": "red"}', "sRGB or linear, not 'red'"),
+        ("sRGB " + " ".join(["e"] * len(RINGS)), "must be auto, none"),
         ({"light": "red"}, "sRGB or linear, not 'red'"),
         ({"kernel": [[1.0]]}, "5 rows of 5 numbers"),
         ({"kernel": [["1"] * 5] * 5}, "5 rows of 5 numbers"),

@@ -83,9 +83,8 @@ def check_replaceable(jobs: Iterable[BatchJob], manifest: Manifest) -> None:
     if found:
         names = ", ".join(map(str, found[:MOST_NAMES])) + (", ..." if len(found) > MOST_NAMES else "")
         count = "a result exists and was" if len(found) == 1 else f"{len(found)} results exist and were"
-        raise UsageError(
-            f"{count} not written by warpsplat; give results other names (output), or --overwrite: {names}"
-        )
+        hint = "-o gives results other names, --overwrite replaces them"
+        raise UsageError(f"{count} not written by warpsplat; {hint}: {names}")
 
 
 def _may_replace(output: Path, manifest: Manifest) -> bool:

@@ -92,12 +92,12 @@ def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = No
     """
     tolerance = ROUNDING + noise
     sides = [image, image.swapaxes(0, 1)]
-    crossings = [_crossings(side, tolerance) for side in sides]
+    crossings, lines = zip(*[_crossings(side, tolerance) for side in sides], strict=True)
     if image.shape[2] == 4:
         is_linear = False
     if is_linear is None:
         votes = [_votes(side, found, tolerance) for side, found in zip(sides, crossings, strict=True)]
-        votes += [_line_votes(side, _crossings(side, tolerance, of_lines=True), tolerance) for side in sides]
+        votes += [_line_votes(side, found, tolerance) for side, found in zip(sides, lines, strict=True)]
         linear, gamma = (sum(vote[i] for vote in votes) for i in (0, 1))
         is_linear = linear - gamma > SURE * float(np.sqrt(linear + gamma))
     plain, clean = image.copy(), np.zeros(image.shape[:2], np.bool_)
@@ -128,8 +128,8 @@ def find_edges(image: Floats, noise: float = 0.0, *, is_linear: bool | None = No
     return Edges(plain, clean, 2 * ringed > count, is_linear)
 
 
-def _crossings(image: Floats, tolerance: float, *, of_lines: bool = False) -> _Crossings:
-    """Return where the rows of an image cross its clean edges; ``of_lines``: lines on a flat colour."""
+def _crossings(image: Floats, tolerance: float) -> tuple[_Crossings, _Crossings]:
+    """Return where the rows of an image cross its clean edges, and where lines on a flat colour."""
     width = image.shape[1]
     same = channel_max(np.abs(np.diff(image, axis=1))) <= tolerance
     flat = np.zeros(image.shape[:2], np.bool_)
@@ -148,11 +148,13 @@ def _crossings(image: Floats, tolerance: float, *, of_lines: bool = False) -> _C
     rows, before, after = rows[near], before[near], after[near]
     one, other = image[rows, before], image[rows, after]
     apart = channel_max(np.abs(other - one))
-    step = apart <= tolerance if of_lines else apart > EDGE
-    rows, before, after, one, other = (each[step] for each in (rows, before, after, one, other))
-    counts = after - before - 1
-    columns = ranges(before + 1, counts)
-    return _Crossings(rows, before, after, one, other, np.repeat(np.arange(len(rows)), counts), columns)
+
+    def taken(some: Bools) -> _Crossings:
+        counts = (after - before - 1)[some]
+        owner, columns = np.repeat(np.arange(len(counts)), counts), ranges(before[some] + 1, counts)
+        return _Crossings(rows[some], before[some], after[some], one[some], other[some], owner, columns)
+
+    return taken(apart > EDGE), taken(apart <= tolerance)
 
 
 def _is_ring(pixels: Floats, near: Floats, far: Floats, tolerance: float) -> Bools:

@@ -148,6 +148,12 @@ class Seen:
 
     def _kernel(self, rings: list[Floats], steps: Floats, some: tuple[Ints, ...]) -> tuple[Kernel, float]:
         """Return the kernel for some pixels, and the squared error with it."""
+
+        def left(tried: Kernel) -> float:
+            return _squared(self._planes(self._residual(self.in_srgb(_summed(tried, rings)), steps, some)))
+
+        if self.kernel is not None:
+            return self.kernel, left(self.kernel)
         light = self._planes(self.in_light(self.levels[some]))
         planes = [self._planes(ring) for ring in rings]
         center = planes[0] / COUNTS[0]
@@ -155,12 +161,6 @@ class Seen:
         table = np.array(columns, np.float64).reshape(len(columns), -1)
         right = (light - center).reshape(-1).astype(np.float64)
         weight = usual = np.repeat(np.where(self.edges.clean[some], CLEAN, 1), light.shape[1])
-
-        def left(tried: Kernel) -> float:
-            return _squared(self._planes(self._residual(self.in_srgb(_summed(tried, rings)), steps, some)))
-
-        if self.kernel is not None:
-            return self.kernel, left(self.kernel)
         kernel, error = NONE, left(NONE)
         told = int(((light > 0) & (light < 255)).sum())
         for _ in range(ROUNDS if told > len(table) else 0):

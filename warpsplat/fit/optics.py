@@ -1,4 +1,4 @@
-"""What is known of how an image was made of sharp shapes, and how users say it."""
+"""Optics that users give: how an image was made of sharp shapes."""
 
 from __future__ import annotations
 
@@ -32,13 +32,16 @@ WORDS = ("auto", "none", *get_args(Light))
 WANTED = f"{', '.join(WORDS)} or a report.json of --json"
 """Values of the option, in words."""
 
-PATTERN = rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})( [-+.e\d]+){{{len(RINGS)}}}"
+NUMBER = r"-?\d+(\.\d+)?(e[-+]?\d+)?"
+"""A weight of a kernel as a text."""
+
+PATTERN = rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})( {NUMBER}){{{len(RINGS)}}}"
 """Values of the option, as ``parse_optics`` returns them."""
 
 
 @dataclass(frozen=True)
 class Optics:
-    """What is known of how an image was made of sharp shapes; None: to be found."""
+    """How an image was made of sharp shapes; None: to be found."""
 
     light: Light | None = None
     kernel: Kernel | None = None

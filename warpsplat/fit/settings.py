@@ -355,8 +355,8 @@ class Settings:
     )
     optics: str = option(
         "auto",
-        "Undo what a scan, a filter or resizing did to the edges of a drawing: auto, none, sRGB or linear "
-        "light, or as in a report.json of --json.",
+        "What a scan, a filter or resizing did to the edges of a drawing, to be undone: auto (found), none, "
+        "the light alone (sRGB, linear), or the report.json of a run with --json.",
         pattern=how.PATTERN,
         wanted=how.WANTED,
         metavar="HOW",

@@ -32,7 +32,7 @@ class Explained:
         how = "blurred" if 4 * self.kernel[0][0] <= 1 else "sharpened"
         how = "mixed in linear light" if self.light == "linear" else how
         return (
-            f"the image looks {how}, and is drawn as it was before; {how} in the same way, the file matches "
+            f"the image looks {how}, and is drawn as it was before; treated the same way, the file matches "
             f"it to {self.psnr:.1f} dB (optics 'none' draws the edges that it has)"
         )
 
