@@ -112,6 +112,15 @@ def test_pixels_that_are_exact_stay_exact() -> None:
     assert (traced.joints != Joint.SMOOTH).all() and (traced.joints != Joint.FREE).all()
 
 
+def test_a_narrow_strap_has_the_colour_of_its_whole_pixels() -> None:
+    # Each of its pixels is at a border: those that are wholly of it tell its colour, not the mixed ones.
+    image = np.broadcast_to(np.array([165, 121, 57], np.float32) / 255, (32, 32, 3)).copy()
+    image[:, 12:20] = 0
+    share = np.array([0.557, 1, 1, 1, 0.868])[:, None]
+    image[:, 13:18] = np.round(share * (106, 70, 47)) / 255
+    assert "6a462f" in hex_colors(trace(image))
+
+
 def test_lower_shapes_continue_below_upper_ones() -> None:
     """The square is four corners, the disc on its edge cuts nothing out of it."""
     body = ground("#fff") + '<rect x="10" y="20" width="50" height="50" fill="#357"/>'

@@ -27,13 +27,16 @@ def with_best_colors(partition: Partition, regions: Regions) -> Partition:
     flat = np.array([c.ramp is None and not c.is_band for c in partition.colorings], np.bool_)
     painted = partition.painted
     cells = painted.blocks.reshape(-1, partition.scale**2)
-    mixed = np.flatnonzero((cells != cells[:, :1]).any(axis=1))
-    cells, (rows, columns) = cells[mixed], (each[mixed] // partition.scale for each in painted.corners)
+    # A block whose cells are alike is as pure as a pixel that is whole; blocks of the frame show nothing.
+    pure = painted.pixels.copy()
+    is_mixed = (cells != cells[:, :1]).any(axis=1)
+    pure[painted.block >= 0] = np.where(is_mixed, NO_REGION, cells[:, 0])
+    pure = pure[1:-1, 1:-1]
+    rows, columns = (each[is_mixed] // partition.scale for each in painted.corners)
+    cells = cells[is_mixed]
     left = regions.image[rows, columns].astype(np.float64)
     at = np.broadcast_arrays(rows[:, None], columns[:, None], cells)[:2]
     left -= colors_at(regions, cells, *at).mean(axis=1, dtype=np.float64)
-    pure = painted.pixels[1:-1, 1:-1].copy()
-    pure[rows, columns] = NO_REGION
     whole = [channel[pure >= 0].astype(np.float64) for channel in np.moveaxis(regions.image, 2, 0)]
     pure = pure[pure >= 0]
     # The area of each colouring in each mixed pixel where it is.
