@@ -72,8 +72,10 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
 
         compile_meanwhile(Kind.FILL, run.backend)
     most = None if settings.simplify else settings.curves
-    is_soft = settings.optics == "none" or Optics.of(settings.optics).kernel is not None
-    picture, price = Picture.of(problem.target, is_soft=is_soft), byte_price(settings)
+    known = Optics.of(settings.optics)
+    is_soft = settings.optics == "none" or known.kernel is not None
+    picture = Picture.of(problem.target, is_soft=is_soft, illumination=known.illumination)
+    price = byte_price(settings)
     announce_trace(picture, settings)
     picture, found = _sharp(picture, settings, run, most)
     if not run.over():
@@ -205,6 +207,8 @@ def _drawn(picture: Picture, found: _Trace, settings: Settings, run: Run, price:
     grid = done.per_pixel / float(picture.enlargement.mean())
     scene = simple(rounded(scene, grid), grid)
     optics = picture.optics or (Optics() if picture.is_interpolated else None)
+    if picture.illumination:
+        optics = replace(optics or Optics("sRGB", NONE), illumination=picture.illumination)
     return Fit(scene, grid, psnr, psnr, 0, run.stopped(), optics=optics)
 
 

@@ -9,11 +9,12 @@ import numpy.typing as npt
 
 from warpsplat.drawing.chroma import has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.denoise import without_noise
+from warpsplat.drawing.illumination import evened, find_illumination
 from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
 from warpsplat.drawing.trace.seeds import noise_of
-from warpsplat.fit.optics import Optics
+from warpsplat.fit.optics import Illumination, Optics
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.geometry import enlarged
 
@@ -56,11 +57,19 @@ class Picture:
     is_interpolated: bool = False
     """Whether the image was enlarged by interpolation, which is undone."""
 
+    illumination: Illumination | None = None
+    """The light on its paper, which was uneven and is even now."""
+
     @classmethod
-    def of(cls, image: FloatArray, *, is_soft: bool = False) -> Picture:
+    def of(
+        cls, image: FloatArray, *, is_soft: bool = False, illumination: Illumination | None = None
+    ) -> Picture:
         """Return the picture of an image.
 
-        ``is_soft``: leave what interpolation made of it.
+        Args:
+            image: sRGB in [0, 1], or premultiplied with opacity.
+            is_soft: Leave what interpolation and uneven light made of it.
+            illumination: To be undone in any case.
         """
         factor = _enlargement(image)
         before = None if is_soft or factor > 1 else before_enlarging(np.round(image * np.float32(255)))
@@ -68,6 +77,10 @@ class Picture:
         repeated = np.ascontiguousarray(image[::factor, ::factor])
         small = repeated if before is None else before / np.float32(255)
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
+        if illumination is None and not is_soft:
+            illumination = find_illumination(small)
+        if illumination:
+            small = evened(small, illumination)
         is_halved = has_blurred_colors(small)
         pixels, noise = without_noise(small)
         if is_halved:
@@ -96,6 +109,7 @@ class Picture:
             seen=framed(small) if is_halved else None,
             is_halved=is_halved,
             is_interpolated=is_interpolated,
+            illumination=illumination,
         )
 
     @property

@@ -26,6 +26,12 @@ COUNTS = [4 if a == b else 8 for a, b in RINGS]
 Kernel = tuple[float, ...]
 """A weight for the samples of each of RINGS; those of all samples add up to 1."""
 
+TERMS = 6
+"""Of a polynomial of the second degree in x and y, which go from -1/2 to 1/2: 1, x, y, x², xy, y²."""
+
+Illumination = tuple[tuple[float, ...], ...]
+"""Light on paper, over the greatest: such a polynomial for each of the three channels."""
+
 WORDS = ("auto", "none", *get_args(Light))
 """Values of the option that are words."""
 
@@ -35,7 +41,13 @@ WANTED = f"{', '.join(WORDS)} or a report.json of --json"
 NUMBER = r"-?\d+(\.\d+)?(e[-+]?\d+)?"
 """A weight of a kernel as a text."""
 
-PATTERN = rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})( {NUMBER}){{{len(RINGS)}}}"
+CHANNELS = 3
+"""Of an image that is a scan or a photograph of paper."""
+
+PATTERN = (
+    rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})(( {NUMBER}){{{len(RINGS)}}})?"
+    rf"(( {NUMBER}){{{CHANNELS * TERMS}}})?"
+)
 """Values of the option, as ``parse_optics`` returns them."""
 
 
@@ -45,17 +57,22 @@ class Optics:
 
     light: Light | None = None
     kernel: Kernel | None = None
+    illumination: Illumination | None = None
 
     @classmethod
     def of(cls, text: str) -> Optics:
         """Return what a value of ``parse_optics`` says is known."""
-        light, *kernel = text.split()
+        light, *rest = text.split()
+        numbers = tuple(map(float, rest))
         given = light if light in get_args(Light) else None
-        return cls(given, tuple(map(float, kernel)) or None)  # type: ignore[arg-type]
+        count = len(RINGS) if len(numbers) % TERMS else 0
+        kernel, others = numbers[:count], numbers[count:]
+        channels = tuple(others[first : first + TERMS] for first in range(0, len(others), TERMS))
+        return cls(given, kernel or None, channels or None)  # type: ignore[arg-type]
 
 
 def parse_optics(value: Any) -> str:
-    """Return a word, or optics as those of a report, as a text: the light and the weights of the kernel.
+    """Return a word, or optics as those of a report, as a text: light, weights of the kernel, illumination.
 
     Raises ``UsageError`` for anything else.
     """
@@ -72,25 +89,32 @@ def parse_optics(value: Any) -> str:
 def _text(given: Mapping[str, Any]) -> str:
     """Return optics as a text: ``{"light": "linear", "kernel": [[...], ...]}``, or a report that has them."""
     given = given.get("optics", given)
-    if not isinstance(given, Mapping) or not given.keys() & {"light", "kernel"}:
-        raise UsageError("optics must have a light, sRGB or linear, a kernel, or both")
-    light, kernel = given.get("light", "sRGB"), given.get("kernel")
+    if not isinstance(given, Mapping) or not given.keys() & {"light", "kernel", "illumination"}:
+        raise UsageError("optics must have a light, sRGB or linear, a kernel, or an illumination")
+    light, kernel, illumination = given.get("light", "sRGB"), given.get("kernel"), given.get("illumination")
     if light not in get_args(Light):
         raise UsageError(f"the light of optics must be sRGB or linear, not {shown(light)}")
-    if kernel is None:
-        return str(light)
-    return " ".join([light, *map(repr, _weights(kernel))])
+    numbers = [*(() if kernel is None else _weights(kernel))]
+    numbers += () if illumination is None else _numbers(illumination, "illumination", CHANNELS, TERMS)
+    return " ".join([light, *map(repr, numbers)])
+
+
+def _numbers(rows: Any, name: str, count: int, length: int) -> list[float]:
+    """Return the numbers of rows of one length."""
+    known = [row for row in rows if _is_list(row)] if _is_list(rows) else []
+    numbers = [float(each) for row in known for each in row if _is_number(each)]
+    if [len(row) for row in known] != [length] * count or len(numbers) != count * length:
+        raise UsageError(f"the {name} of optics must be {count} rows of {length} numbers, as in a report")
+    return numbers
 
 
 def _weights(kernel: Any) -> Kernel:
     """Return the weights of a kernel's RINGS, which is a quarter of it, shape (RADIUS, RADIUS)."""
-    rows = [row for row in kernel if _is_list(row)] if _is_list(kernel) else []
-    numbers = [each for row in rows for each in row if _is_number(each)]
-    if [len(row) for row in rows] != [RADIUS] * RADIUS or len(numbers) != RADIUS * RADIUS:
-        raise UsageError(f"the kernel of optics must be {RADIUS} rows of {RADIUS} numbers, as in a report")
+    numbers = _numbers(kernel, "kernel", RADIUS, RADIUS)
+    rows = [numbers[first : first + RADIUS] for first in range(0, len(numbers), RADIUS)]
     if any(rows[a][b] != rows[b][a] for a, b in RINGS):
         raise UsageError("the kernel of optics must be the same across and down")
-    weights = [float(rows[a][b]) for a, b in RINGS]
+    weights = [rows[a][b] for a, b in RINGS]
     total = sum(n * w for n, w in zip(COUNTS, weights, strict=True))
     if abs(total - 1) > 0.01:
         raise UsageError(f"the weights of the kernel of optics must add up to 1/4, not {total / 4:.4g}")

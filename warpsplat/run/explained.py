@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from warpsplat.drawing.illumination import evened, relative
 from warpsplat.drawing.optics import SCALE, Seen
 from warpsplat.fit.export import finished, shown_image
-from warpsplat.fit.optics import RADIUS, RINGS
+from warpsplat.fit.optics import RADIUS, RINGS, Illumination
 from warpsplat.fit.problem import Fit, Problem
 from warpsplat.portable.elementary import log10
 from warpsplat.scene import FloatArray
@@ -27,12 +28,24 @@ class Explained:
     """Weights of samples at 1/4, 3/4, ... 9/4 px from the middle of a pixel, down and across: a quarter of a
     symmetric kernel, whose weights add up to 1."""
 
+    illumination: Illumination | None = None
+    """The light on paper, over the greatest: a polynomial of the second degree for each channel. None: even."""
+
     def words(self) -> str:
         """Return a sentence for people."""
-        how = "blurred" if 4 * self.kernel[0][0] <= 1 else "sharpened"
-        how = "mixed in linear light" if self.light == "linear" else how
+        middle = 4 * self.kernel[0][0]
+        hows = [
+            word
+            for word, is_so in (
+                ("mixed in linear light", self.light == "linear"),
+                ("blurred", self.light != "linear" and (middle < 1 or not self.illumination)),
+                ("sharpened", self.light != "linear" and middle > 1),
+                ("unevenly lit", self.illumination),
+            )
+            if is_so
+        ]
         return (
-            f"the image looks {how}, and is drawn as it was before; treated the same way, the file matches "
+            f"the image looks {' and '.join(hows)}, and is drawn as it was before; treated the same way, the file matches "
             f"it to {self.psnr:.1f} dB (optics 'none' draws the edges that it has)"
         )
 
@@ -43,7 +56,9 @@ class Explained:
 
 def explained(made: Fit, problem: Problem) -> Explained:
     """Return how the image of a problem was made of a drawing."""
-    seen, target = Seen.of(problem.target, known=made.optics), problem.target
+    target, illumination = problem.target, made.optics.illumination if made.optics else None
+    lit = evened(target, illumination) if illumination else target
+    seen = Seen.of(lit, known=made.optics)
     images = [
         shown_image(finished(scene, problem.settings, made.per_pixel / SCALE), scene, target.shape[2])
         for scene in seen.scenes(made.scene)
@@ -54,7 +69,8 @@ def explained(made: Fit, problem: Problem) -> Explained:
         tuple(round(weights[max(y, x), min(y, x)], 5) for x in range(RADIUS)) for y in range(RADIUS)
     )
     light = "linear" if seen.edges.is_linear else "sRGB"
-    return Explained(psnr_of(found.shown, target), light, kernel)
+    shown = found.shown * relative(illumination, target) if illumination else found.shown
+    return Explained(psnr_of(shown, target), light, kernel, illumination)
 
 
 def psnr_of(shown: FloatArray, target: FloatArray) -> float:
