@@ -86,14 +86,6 @@ def test_bilateral_as_by_opencv(name: str) -> None:
     assert_near(filters.bilateral(image, 7, 0.3, 2.5), cv2.bilateralFilter(image, 7, 0.3, 2.5))
 
 
-def test_places_as_by_opencv() -> None:
-    """Places in whole 32nds of a pixel: OpenCV rounds others to these."""
-    image = IMAGES["40x53"]
-    x, y = (RANDOM.integers(-96, 1900, (30, 20)).astype(np.float32) / 32 for _ in range(2))
-    theirs = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    assert_near(filters.remap_linear(image, x, y), theirs)
-
-
 def test_distances() -> None:
     mask = RANDOM.uniform(size=(60, 80)) < 0.99
     rows, columns = np.nonzero(~mask)
@@ -165,10 +157,9 @@ def test_pinned_bits() -> None:
         filters.box_blur(image, 9),
         *filters.sobel(IMAGES["40x53"]),
         filters.bilateral(image, 7, 0.2, 2.5),
-        filters.remap_linear(IMAGES["40x53"], 60 * image[..., 0] - 3, 50 * image[..., 1] - 3),
         filters.distance(image[..., 0] > 0.05),
         filters.grey(image),
         filters.lab(image),
     ]
     digest = hashlib.sha256(b"".join(np.asarray(each, "<f4").tobytes() for each in made)).hexdigest()
-    assert digest[:16] == "577d866c8b64c2f5"
+    assert digest[:16] == "d191c4433bf01efa"

@@ -33,17 +33,7 @@ def test_systems() -> None:
     assert np.allclose(linear.determinant(STACK), np.linalg.det(STACK))
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, 9])
-def test_systems_of_few_diagonals(size: int) -> None:
-    factor = np.triu(np.tril(RANDOM.uniform(1, 2, (size, size))), -2)
-    matrix, right = factor @ factor.T, RANDOM.uniform(-3, 3, (size, 4))
-    diagonals = [np.diagonal(matrix, away) for away in range(3)]
-    assert np.allclose(linear.solve_banded(diagonals, right), np.linalg.solve(matrix, right))
-
-
 def test_a_singular_system_is_an_error() -> None:
-    with pytest.raises(np.linalg.LinAlgError):
-        linear.solve_banded([np.ones(2), np.ones(1)], np.ones((2, 1)))
     with pytest.raises(np.linalg.LinAlgError):
         linear.solve(np.zeros((2, 2)), np.ones(2))
     with pytest.raises(np.linalg.LinAlgError):
@@ -107,7 +97,6 @@ def test_pinned_bits() -> None:
         linear.product(TALL.reshape(-1, 126), TALL.reshape(126, -1)),
         linear.solve(STACK, STACK[::-1]),
         linear.determinant(STACK),
-        linear.solve_banded([9 + STACK[0, 0], STACK[0, 1, :3], STACK[0, 2, :2]], STACK[1]),
         linear.principal_direction(TALL[0, :, :2]),
         *linear.svd(TALL),
         *linear.eigh(STACK[:, :2, :2] + STACK[:, :2, :2].swapaxes(1, 2)),
@@ -115,4 +104,4 @@ def test_pinned_bits() -> None:
         convolve(STACK.ravel(), TALL[0, 0]),
     ]
     digest = hashlib.sha256(b"".join(np.asarray(each, "<f8").tobytes() for each in made)).hexdigest()
-    assert digest[:16] == "618441c4d25e3a8f"
+    assert digest[:16] == "c4885c1ac6768cae"

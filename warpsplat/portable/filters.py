@@ -338,24 +338,6 @@ def _bilateral_band(planes: Floats, width: int, reach: int, sigma_color: float, 
     return total
 
 
-def remap_linear(image: Floats, x: Floats, y: Floats) -> Floats:
-    """Return the values of an image (height, width) at columns ``x`` and rows ``y``, arrays of one shape [px,
-    whole at the centres of pixels], interpolated linearly; border pixels repeat.
-    """
-    image = np.ascontiguousarray(_floats(image))
-    height, width = image.shape
-    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
-    column, row = x.astype(np.intp), y.astype(np.intp)
-    right, down = (x - column).astype(image.dtype), (y - row).astype(image.dtype)
-    first, lower = row * width, np.minimum(row + 1, height - 1) * width
-    beside = np.minimum(column + 1, width - 1)
-    flat = image.reshape(-1)
-    above, below = flat[first + column], flat[lower + column]
-    above = above + right * (flat[first + beside] - above)
-    below = below + right * (flat[lower + beside] - below)
-    return np.asarray(above + down * (below - above))
-
-
 def distance(mask: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Return the distance of each pixel of ``mask`` from the nearest that is 0 [px], shape (height, width).
 

@@ -5,7 +5,6 @@ Sums run over the inner index in ascending order. Matrices are the last two axes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -152,36 +151,6 @@ def svd(matrix: Matrices) -> tuple[Result, Result, Result]:
     left = np.take_along_axis(matrix, order[..., None, :], axis=-1)
     left = left / np.where(values == 0, 1.0, values)[..., None, :]
     return left, values, np.swapaxes(np.take_along_axis(rotation, order[..., None, :], axis=-1), -2, -1)
-
-
-def solve_banded(diagonals: Sequence[Matrices], right: Matrices) -> Result:
-    """Return ``x`` of ``matrix @ x = right`` for a symmetric positive definite matrix with few diagonals.
-
-    Args:
-        diagonals: The main one, shape (n,), and those beside it, (n - 1,), (n - 2,) ...
-        right: Shape (n, k).
-
-    Raises:
-        np.linalg.LinAlgError: The matrix is not positive definite.
-    """
-    lower = [np.asarray(diagonal, np.float64).tolist() for diagonal in diagonals]
-    found = np.array(right, np.float64)
-    size, factors = len(found), []
-    for i in range(size):
-        pivot = lower[0][i]
-        if not pivot > 0:
-            raise np.linalg.LinAlgError("the matrix is not positive definite")
-        below = [lower[d][i] for d in range(1, min(len(lower), size - i))]
-        factors.append([value / pivot for value in below])
-        for d, factor in enumerate(factors[i]):
-            for e in range(d, len(below)):
-                lower[e - d][i + 1 + d] -= factor * below[e]
-            found[i + 1 + d] -= factor * found[i]
-    for i in range(size - 1, -1, -1):
-        found[i] /= lower[0][i]
-        for d, factor in enumerate(factors[i]):
-            found[i] -= factor * found[i + 1 + d]
-    return found
 
 
 def eigh(matrix: Matrices) -> tuple[Result, Result]:

@@ -101,10 +101,6 @@ class Joint(IntEnum):
     """At a third of a straight line."""
 
 
-CHOICES = (Kind, Basis, Rule, Cap, Join, Paint, Spread)
-"""The types of traits; the fields of ``Scene`` have their names in lower case."""
-
-
 class Unit(Enum):
     """Units of numbers in the table."""
 
