@@ -212,9 +212,8 @@ def test_the_price_of_a_region_matches_its_bytes() -> None:
 )
 def test_the_price_of_a_basic_shape_matches_its_bytes(outline: Outline) -> None:
     made = drawing(LARGE, (BLUE, [outline]))
-    ((_, shape),) = primitives(made.scene, 10.0 * made.scene.points.astype(np.float64))
-    whole, other = shape.rounded(), ring(5, 0)
-    assert whole is not None
+    ((_, whole),) = primitives(made.scene, 10.0 * made.scene.points.astype(np.float64), whole=True)
+    other = ring(5, 0)
     bare = written(made.take(np.zeros(0, np.intp))) + len('<path d="" fill="#03c"/>')
     joined = drawing(LARGE, (BLUE, [other, outline])), drawing(LARGE, (BLUE, [other]))
     taken = min(written(made) - bare, each(*joined, 1))

@@ -101,7 +101,7 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
     contours = np.searchsorted(scene.starts, scene.first).tolist()
     strokes = scene.kind == Kind.STROKE
     # A stroke's dashes depend on where it starts.
-    arcs = {i: made.rounded() for i, made in primitives(scene, exact) if made.radii[0] > 0}
+    arcs = {i: made for i, made in primitives(scene, exact, whole=True) if made.radii[0] > 0}
     rings = Rings()
     stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
     for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):

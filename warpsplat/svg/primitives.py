@@ -5,8 +5,9 @@ All of them are boxes with corners of some radii: 0 for sharp ones, half the sid
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,27 +47,16 @@ class Primitive:
         )
         return x, y
 
-    def rounded(self) -> Primitive | None:
-        """Return it in whole numbers; None if nothing would be left."""
-        ends = []
-        for a, b, r, is_round in zip(self.low, self.high, self.radii, self.is_round, strict=True):
-            middle, radius = round((a + b) / 2), round(r)
-            ends.append((middle - radius, middle + radius) if is_round else (round(a), round(b)))
-            if radius < (r > 0) or ends[-1][1] - ends[-1][0] < max(1, 2 * radius):
-                return None
-        radii = round(self.radii[0]), round(self.radii[1])
-        return Primitive((ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]), radii, self.is_clockwise)
-
     def cubics(self) -> Floats:
         """Return its arcs and sides, the first one an arc at the upper left, shape (piece, 4, 2)."""
-        return cubics_of([self])[0]
+        boxes = np.array([(*self.low, *self.high, *self.radii)], np.float64)
+        ((_, cubics),) = _cubics(boxes, np.array([self.is_clockwise]))
+        return np.asarray(cubics[0])
 
     def nodes(self) -> list[tuple[float, float]]:
         """Return where its arcs and sides begin."""
-        (x0, y0), (x1, y1), (rx, ry) = self.low, self.high, self.radii
-        ends = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
-        ends += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
-        shown = [i for i in range(8) if (not self.is_round[i // 2 % 2] if i % 2 else rx > 0)]
+        ends = _ends(*self.low, *self.high, *self.radii)
+        shown = [i for i in range(8) if (not self.is_round[i // 2 % 2] if i % 2 else self.radii[0] > 0)]
         if self.is_clockwise:
             return [ends[i] for i in shown]
         return [ends[(i + 1) % 8] for i in reversed(shown)]
@@ -108,14 +98,10 @@ class Primitive:
         return f"{text}z", start
 
 
-def cubics_of(made: Sequence[Primitive]) -> list[Floats]:
-    """Return the arcs and sides of each of some shapes, as ``Primitive.cubics``."""
-    found: list[Floats] = [np.zeros((0, 4, 2))] * len(made)
-    boxes = np.array([(*one.low, *one.high, *one.radii) for one in made], np.float64).reshape(-1, 6)
-    for chosen, cubics in _cubics(boxes, np.array([one.is_clockwise for one in made], np.bool_)):
-        for i, own in zip(chosen.tolist(), cubics, strict=True):
-            found[i] = own
-    return found
+def _ends(x0: Any, y0: Any, x1: Any, y1: Any, rx: Any, ry: Any) -> list[tuple[Any, Any]]:
+    """Return where the arcs of corners begin and end, clockwise from the left; of numbers or of arrays."""
+    upper = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
+    return [*upper, (x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
 
 
 def _are_round(boxes: Floats) -> npt.NDArray[np.bool_]:
@@ -136,8 +122,7 @@ def _cubics(boxes: Floats, clockwise: npt.NDArray[np.bool_]) -> Iterator[tuple[I
         *is_round, has_arcs, is_clockwise = kinds[chosen[0]].tolist()
         x0, y0, x1, y1, rx, ry = boxes[chosen].T
         corners = [np.stack(own, axis=1) for own in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
-        nodes = [(x0, y0 + ry), (x0 + rx, y0), (x1 - rx, y0), (x1, y0 + ry)]
-        nodes += [(x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
+        nodes = _ends(x0, y0, x1, y1, rx, ry)
         places = [np.stack(own, axis=1) for own in (*nodes, nodes[0])]
         pieces: list[Floats] = []
         for i, corner in enumerate(corners):
@@ -150,13 +135,15 @@ def _cubics(boxes: Floats, clockwise: npt.NDArray[np.bool_]) -> Iterator[tuple[I
         yield chosen, cubics if is_clockwise else cubics[:, ::-1, ::-1]
 
 
-def primitives(scene: Scene, exact: Floats) -> Iterator[tuple[int, Primitive]]:
+def primitives(scene: Scene, exact: Floats, *, whole: bool = False) -> Iterator[tuple[int, Primitive]]:
     """Yield the contours of fills that are ellipses or rectangles.
 
-    ``exact``: the scene's points in units of the view box, shape (point, 2).
+    ``exact``: the scene's points in units of the view box, shape (point, 2). ``whole``: in whole numbers,
+    without those of which nothing would be left.
     """
     for contours, boxes, clockwise, _ in _alike(scene, exact):
-        rows = zip(contours.tolist(), boxes.tolist(), clockwise.tolist(), strict=True)
+        held, left = _rounded(boxes) if whole else (boxes, np.ones(len(boxes), np.bool_))
+        rows = zip(contours[left].tolist(), held[left].tolist(), clockwise[left].tolist(), strict=True)
         for contour, (x0, y0, x1, y1, rx, ry), is_clockwise in rows:
             yield contour, Primitive((x0, y0), (x1, y1), (rx, ry), is_clockwise)
 
@@ -209,7 +196,7 @@ def _begun(rings: Floats, first: IndexArray) -> Floats:
 
 
 def _rounded(boxes: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Return boxes as ``Primitive.rounded``, and which of them are left."""
+    """Return boxes in whole numbers, and of which of them something is left."""
     low, high, exact = boxes[:, :2], boxes[:, 2:4], boxes[:, 4:]
     radii, middle, is_round = np.round(exact), np.round((low + high) / 2), _are_round(boxes)
     low = np.where(is_round, middle - radii, np.round(low))

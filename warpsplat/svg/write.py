@@ -170,10 +170,10 @@ def _basic_shapes(scene: Scene, per_pixel: float) -> dict[int, str]:
     alone = np.diff(np.searchsorted(scene.starts, scene.first)) == 1
     alone &= ~(scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
     owner, found = scene.contour_shapes().tolist(), {}
-    for contour, made in primitives(scene, scene.points.astype(np.float64) * units(scene, per_pixel)):
-        held = made.rounded()
-        if held and alone[owner[contour]] and (held.low > np.zeros(2)).any() | (held.high < size).any():
-            found[owner[contour]] = held.element()
+    exact = scene.points.astype(np.float64) * units(scene, per_pixel)
+    for contour, made in primitives(scene, exact, whole=True):
+        if alone[owner[contour]] and (made.low > np.zeros(2)).any() | (made.high < size).any():
+            found[owner[contour]] = made.element()
     return found
 
 
