@@ -33,9 +33,6 @@ class Form(Protocol):
     gather: wp.Kernel
     """The adjoint."""
 
-    def drawn(self, count: int, closed: bool) -> int:
-        """Return the number of control points that ``count`` values make."""
-
     def outline(self, values: Array, closed: bool) -> Array:
         """Return the control points of cubics, shape (shape, point, 2): what ``place`` computes."""
 

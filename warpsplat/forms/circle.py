@@ -17,11 +17,6 @@ TURNED = False
 AROUND = table_of(QUARTERS)
 
 
-def drawn(count: int, closed: bool) -> int:
-    """Return three points for each of four arcs."""
-    return len(QUARTERS)
-
-
 def outline(values: Array, closed: bool) -> Array:
     """Return four arcs, from the right clockwise."""
     return values[:, :1] + values[:, 1:, :1] * QUARTERS.astype(values.dtype)

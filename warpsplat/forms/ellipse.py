@@ -12,11 +12,6 @@ TAGS = ("ellipse",)
 TURNED = True
 
 
-def drawn(count: int, closed: bool) -> int:
-    """Return three points for each of four arcs."""
-    return len(frame.QUARTERS)
-
-
 def outline(values: Array, closed: bool) -> Array:
     """Return four arcs."""
     return frame.placed(values, frame.QUARTERS)

@@ -15,11 +15,6 @@ TAGS = ("polygon", "polyline", "line")
 TURNED = False
 
 
-def drawn(count: int, closed: bool) -> int:
-    """Return three points for each side."""
-    return 3 * count if closed else 3 * count - 2
-
-
 def outline(values: Array, closed: bool) -> Array:
     """Return the sides as cubics with handles at the thirds."""
     following = np.roll(values, -1, axis=1)

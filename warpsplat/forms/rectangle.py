@@ -16,11 +16,6 @@ SQUARE = sides(np.array([[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]]),
 """Control points of the square of half side 1."""
 
 
-def drawn(count: int, closed: bool) -> int:
-    """Return three points for each side."""
-    return len(SQUARE)
-
-
 def outline(values: Array, closed: bool) -> Array:
     """Return four sides."""
     return frame.placed(values, SQUARE)

@@ -58,12 +58,8 @@ def read_form(tag: str, points: Points, closed: bool) -> tuple[Basis, Points] | 
     for basis in Basis:
         if not basis.is_form or tag not in form_of(basis.name).TAGS:
             continue
-        form = form_of(basis.name)
-        count = form.VALUES or len(points[::3])
-        if len(points) != form.drawn(count, closed):
-            return None
-        values = form.read(points, closed)
-        return (
-            (basis, values) if np.allclose(form.outline(values[None], closed)[0], points, 0, near) else None
-        )
+        values = form_of(basis.name).read(points, closed)
+        outline = form_of(basis.name).outline(values[None], closed)[0]
+        is_same = outline.shape == points.shape and np.allclose(outline, points, 0, near)
+        return (basis, values) if is_same else None
     return None
