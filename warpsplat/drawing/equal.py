@@ -14,9 +14,10 @@ from warpsplat.drawing.trace.beziers import points_at
 from warpsplat.fit.problem import Run
 from warpsplat.portable.elementary import hypot
 from warpsplat.scene import FloatArray, IndexArray, Scene
+from warpsplat.svg.parts import rows_of
 from warpsplat.svg.primitives import primitives
 from warpsplat.svg.sizes import USE
-from warpsplat.svg.symbols import parts_of, rows_of
+from warpsplat.svg.symbols import parts_of
 
 SAMPLES_PER_CUBIC = 8
 

@@ -261,6 +261,14 @@ class Scene:
         """Return the number of control points of each shape, shape (shape,)."""
         return np.diff(self.first)
 
+    def has_twin(self) -> npt.NDArray[np.bool_]:
+        """Return which shapes share their points with the next one, shape (shape,)."""
+        return np.append(self.twin[1:], 0)[: len(self)] == 1
+
+    def first_contours(self) -> IndexArray:
+        """Return the first contour of each shape and, last, the number of contours, shape (shape + 1,)."""
+        return np.searchsorted(self.starts, self.first)
+
     def contour_shapes(self) -> IndexArray:
         """Return the index of each contour's shape, shape (contour,)."""
         owner = np.searchsorted(self.first, self.starts[:-1], "right") - 1
@@ -295,7 +303,7 @@ class Scene:
         return replace(
             self,
             basis=np.where(self.basis > Basis.SPLINE, Basis.CUBIC, self.basis).astype(np.int32),
-            first=starts[np.searchsorted(self.starts, self.first)],
+            first=starts[self.first_contours()],
             starts=starts,
             points=points,
         )

@@ -57,9 +57,8 @@ def simple(scene: Scene, per_pixel: float) -> Scene:
 
 def free_fills(scene: Scene) -> list[int]:
     """Return the fills of cubics or splines that are not stroked as well."""
-    stroked = (scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
-    free = (scene.basis == Basis.CUBIC) | (scene.basis == Basis.SPLINE)
-    return np.flatnonzero((scene.kind == Kind.FILL) & free & ~stroked).tolist()
+    free = (scene.kind == Kind.FILL) & (scene.twin == 0) & ~scene.has_twin()
+    return np.flatnonzero(free & (scene.basis <= Basis.SPLINE)).tolist()
 
 
 def rings_of(scene: Scene, shape: int, per_pixel: float) -> list[Floats]:

@@ -98,12 +98,12 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
     straight = straight_cubics(scene, exact).tolist()
     grid: list[Pair] = [(x, y) for x, y in np.round(exact).astype(np.int64).tolist()]
     starts, closed = scene.starts.tolist(), scene.closed.astype(np.bool_).tolist()
-    contours = np.searchsorted(scene.starts, scene.first).tolist()
+    contours = scene.first_contours().tolist()
     strokes = scene.kind == Kind.STROKE
     # A stroke's dashes depend on where it starts.
     arcs = {i: made for i, made in primitives(scene, exact, whole=True) if made.radii[0] > 0}
     rings = Rings()
-    stroked = (strokes | np.append(scene.twin[1:], 0).astype(np.bool_)[: len(scene)]).tolist()
+    stroked = (strokes | scene.has_twin()).tolist()
     for shape, is_spline in enumerate((scene.basis == Basis.SPLINE).tolist()):
         texts = []
         pen: Pair | None = None

@@ -20,13 +20,12 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
     Contours whose boxes meet stay together, as one may be a hole in the other, or both may be translucent.
     Shapes that are filled and stroked stay whole.
     """
-    contours = np.searchsorted(scene.starts, scene.first).astype(np.intp)
+    contours = scene.first_contours()
     points = np.diff(scene.starts)
     cubic = scene.basis[scene.contour_shapes()] == Basis.CUBIC
     nodes: IndexArray = np.where(cubic, -(-points // 3), points).astype(np.intp)
     total = np.add.reduceat(np.append(nodes, 0), contours[:-1]) if len(scene) else nodes
-    has_twin = np.append(scene.twin[1:], 0).astype(np.bool_) | scene.twin.astype(np.bool_)
-    large = (total > most) & (np.diff(contours) > 1) & ~has_twin
+    large = (total > most) & (np.diff(contours) > 1) & (scene.twin == 0) & ~scene.has_twin()
     if not large.any():
         return scene
     parts: list[list[IndexArray]] = [[np.arange(low, high)] for low, high in itertools.pairwise(contours)]
@@ -70,24 +69,25 @@ def _packed(clusters: list[list[int]], nodes: IndexArray, most: int) -> list[lis
 def with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
     """Return ``scene`` with shapes split into ``parts``: lists of contours, by shape."""
     # One contour of each stands for all until the parts have their own.
-    one = np.searchsorted(scene.starts, scene.first[:-1])
-    counts = np.diff(scene.starts)[one]
-    bare = replace(
-        scene,
-        points=scene.points[ranges(scene.starts[one], counts)],
-        starts=starts_of(counts),
-        closed=scene.closed[one],
-        first=starts_of(counts),
-    )
+    ones = scene.first_contours()[:-1]
+    bare = _with_contours(scene, scene, ones, np.ones(len(scene), np.intp))
     split = bare.take(np.repeat(np.arange(len(scene)), [len(own) for own in parts]))
     order = [part for own in parts for part in own]
-    contours = np.concatenate(order)
-    counts = np.diff(scene.starts)[contours]
-    starts = starts_of(counts)
+    return _with_contours(split, scene, np.concatenate(order), np.array([len(part) for part in order]))
+
+
+def _with_contours(shapes: Scene, scene: Scene, contours: IndexArray, counts: IndexArray) -> Scene:
+    """Return ``shapes`` with contours of ``scene``, of which each shape has so many."""
+    starts = starts_of(np.diff(scene.starts)[contours])
     return replace(
-        split,
-        points=scene.points[ranges(scene.starts[contours], counts)],
+        shapes,
+        points=scene.points[rows_of(scene, contours)],
         starts=starts,
         closed=scene.closed[contours],
-        first=starts[starts_of(np.array([len(part) for part in order]))],
+        first=starts[starts_of(counts)],
     )
+
+
+def rows_of(scene: Scene, contours: IndexArray) -> IndexArray:
+    """Return the rows of the points of some contours."""
+    return ranges(scene.starts[contours], scene.starts[contours + 1] - scene.starts[contours])

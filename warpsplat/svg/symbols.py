@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from warpsplat.scene import Basis, IndexArray, Kind, Paint, Scene
+from warpsplat.scene.simple import area
 from warpsplat.svg.data import path_data, units
 from warpsplat.svg.paints import unused
-from warpsplat.svg.parts import with_parts
+from warpsplat.svg.parts import rows_of, with_parts
 from warpsplat.svg.sizes import USE
 
 
@@ -20,14 +21,14 @@ def parts_of(scene: Scene) -> list[IndexArray]:
 
     Holes run anticlockwise. Fills that are stroked as well are left out.
     """
-    twin = (scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
-    is_plain = (scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT) & (scene.basis == Basis.CUBIC) & ~twin
-    bounds = np.searchsorted(scene.starts, scene.first)
+    is_plain = (scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT) & (scene.basis == Basis.CUBIC)
+    is_plain &= (scene.twin == 0) & ~scene.has_twin()
+    bounds = scene.first_contours()
     found = []
     for shape in np.flatnonzero(is_plain).tolist():
         contours = np.arange(*bounds[shape : shape + 2])
         rings = [scene.points[scene.starts[c] : scene.starts[c + 1]] for c in contours.tolist()]
-        areas = np.array([_area(ring) for ring in rings])
+        areas = np.array([area(ring.astype(np.float64)) for ring in rings])
         low, high = np.array([r.min(axis=0) for r in rings]), np.array([r.max(axis=0) for r in rings])
         outer = np.flatnonzero(areas > 0)
         parts = {int(i): [int(i)] for i in outer}
@@ -39,17 +40,6 @@ def parts_of(scene: Scene) -> list[IndexArray]:
                 parts[hole] = [hole]
         found += [contours[part] for part in parts.values()]
     return found
-
-
-def _area(ring: npt.NDArray[np.float32]) -> float:
-    x, y = ring[:, 0].astype(np.float64), ring[:, 1].astype(np.float64)
-    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
-def rows_of(scene: Scene, contours: IndexArray) -> IndexArray:
-    """Return the rows of the points of some contours."""
-    starts = scene.starts
-    return np.concatenate([np.arange(starts[c], starts[c + 1]) for c in contours.tolist()])
 
 
 def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, str]]:
@@ -65,8 +55,7 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
         counts = np.diff(scene.starts)[part]
         alike.setdefault(((points - points[0]).tobytes(), counts.tobytes()), []).append(part)
     owner = scene.contour_shapes()
-    first_contours = np.searchsorted(scene.starts, scene.first)
-    split = [[np.arange(a, b)] for a, b in pairwise(first_contours.tolist())]
+    split = [[np.arange(a, b)] for a, b in pairwise(scene.first_contours().tolist())]
     prefix = unused("s", "".join(picture.markup for picture in scene.pictures))
     definitions: list[str] = []
     names: dict[int, tuple[str, int, int]] = {}
@@ -101,7 +90,7 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
 def _data_of(scene: Scene, part: IndexArray, origin: npt.NDArray[np.float64], per_pixel: float) -> str:
     """Return the path data of a part with its first point at 0."""
     shape = int(scene.contour_shapes()[part[0]])
-    own = part - np.searchsorted(scene.starts, scene.first[shape])
+    own = part - scene.first_contours()[shape]
     alone = with_parts(scene.take(np.array([shape])), [[own]])
     moved = replace(alone, points=(alone.points - origin).astype(np.float32))
     return next(path_data(moved, per_pixel))

@@ -106,7 +106,7 @@ class _Paths:
         self._scene, self._per_pixel = scene, per_pixel
         self._data = list(path_data(scene.drawn(), per_pixel))
         self._elements = _basic_shapes(scene, per_pixel) | form_elements(scene, per_pixel) | (symbols or {})
-        self.has_twin: list[int] = np.append(scene.twin[1:], 0).tolist()
+        self.has_twin: list[bool] = scene.has_twin().tolist()
         """Whether the next shape has the same path."""
         colors = hex_colors(scene.colors)
         for shape, name in ramps.items():
@@ -167,8 +167,7 @@ def _basic_shapes(scene: Scene, per_pixel: float) -> dict[int, str]:
     if scene.canvas.crisp:
         return {}
     size = np.array([scene.canvas.width, scene.canvas.height]) * per_pixel
-    alone = np.diff(np.searchsorted(scene.starts, scene.first)) == 1
-    alone &= ~(scene.twin | np.append(scene.twin[1:], 0)[: len(scene)]).astype(np.bool_)
+    alone = (np.diff(scene.first_contours()) == 1) & (scene.twin == 0) & ~scene.has_twin()
     owner, found = scene.contour_shapes().tolist(), {}
     exact = scene.points.astype(np.float64) * units(scene, per_pixel)
     for contour, made in primitives(scene, exact, whole=True):
