@@ -173,18 +173,18 @@ class Document:
         """The text of all style sheets."""
         self._sheet = StyleSheet(self.css, KNOWN)
         self._styles: dict[Element, Style] = {}
-        self.found: dict[tuple[Callable[..., Any], Element], Any] = {}
+        self._found: dict[tuple[Callable[..., Any], Element], Any] = {}
         """Results of ``once``, however many elements refer to another."""
 
     def once(self, find: Callable[[Element, Document], Found], element: Element) -> Found:
         """Return ``find``'s result for an element, or raise its ``ImageError``; computed once."""
         key = find, element
-        if key not in self.found:
+        if key not in self._found:
             try:
-                self.found[key] = find(element, self)
+                self._found[key] = find(element, self)
             except ImageError as error:
-                self.found[key] = error
-        found = self.found[key]
+                self._found[key] = error
+        found = self._found[key]
         if isinstance(found, ImageError):
             raise ImageError(str(found))
         return cast("Found", found)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -116,17 +115,17 @@ def _gradient(
     matrix: Matrix,
     fallback: FlatColor | None,
 ) -> Colouring | None:
-    chain = _chain(element, document)
-    if chain.stops is None:
+    with_stops, attributes = document.once(_chain, element)
+    if with_stops is None:
         return fallback
-    offsets, stops = document.once(_stops, chain.stops)
+    offsets, stops = document.once(_stops, with_stops)
     if len(stops) == 1:
         return stops[0]
     is_radial = name_of(element) == "radialGradient"
 
     def given(name: str) -> str | None:
         """Return an attribute of the gradient or of those that it inherits from."""
-        text = chain.attributes.get(("" if name in COMMON else name_of(element), name))
+        text = attributes.get(name)
         check_length(name, text or "")
         return text
 
@@ -169,48 +168,37 @@ PLACES = {"x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "fr"}
 """Attributes that they inherit from their own kind only."""
 
 
-class _Chain(NamedTuple):
-    """The stops and attributes of a gradient and of those that it links to, directly or not."""
+def _chain(element: Element, document: Document) -> tuple[Element | None, dict[str, str]]:
+    """Return the gradient whose stops a gradient has, if any, and its attributes; own ones come first.
 
-    stops: Element | None
-    """The first gradient with stops; None: there is none before an element that is no gradient."""
-    attributes: dict[tuple[str, str], str]
-    """Values by kind of gradient, empty for ``COMMON``, and name."""
+    It inherits from the element that it links to, from the one that that links to, and so on. None: there
+    are no stops before an element that is no gradient.
 
-
-NOTHING = _Chain(None, {})
-
-
-def _chain(element: Element, document: Document) -> _Chain:
-    """Return a gradient's chain; each gradient of a document is visited once, or twice in a ring of links."""
-    found = document.found
-    path: dict[Element, None] = {}
+    Raises:
+        ImageError: The chain is too long.
+    """
+    longest = 100  # most gradients that one inherits from
+    with_stops: Element | None = None
+    attributes: dict[str, str] = {}
+    seen: set[Element] = set()
+    may_have_stops = True
     at: Element | None = element
-    while at is not None and (_chain, at) not in found and at not in path:
-        path[at] = None
+    while at is not None and at not in seen:
+        seen.add(at)
+        if len(seen) > longest:
+            raise ImageError(f"a gradient inherits from more than {longest} others")
+        kind = name_of(at)
+        may_have_stops &= kind in GRADIENTS
+        if with_stops is None and may_have_stops and any(map(_is_stop, at)):
+            with_stops = at
+        names = COMMON | PLACES if kind == name_of(element) else COMMON if kind in GRADIENTS else set()
+        attributes = {name: text for name, text in at.attrib.items() if name in names} | attributes
         at = document.linked(at)
-    back = list(path)[::-1]
-    chain: _Chain = found.get((_chain, at), NOTHING) if at is not None else NOTHING
-    if at in path:  # a ring: its first gradient inherits from its last as well, which takes two rounds
-        for one in back[: back.index(at) + 1]:
-            chain = _extended(one, chain)
-    for one in back:
-        found[_chain, one] = chain = _extended(one, chain)
-    return chain
+    return with_stops, attributes
 
 
-def _extended(element: Element, chain: _Chain) -> _Chain:
-    """Return the chain of an element that links to the first gradient of ``chain``."""
-    kind = name_of(element)
-    if kind not in GRADIENTS:
-        return _Chain(None, chain.attributes)
-    own = {
-        ("" if name in COMMON else kind, name): text
-        for name, text in element.attrib.items()
-        if name in COMMON or name in PLACES
-    }
-    has_stops = any(name_of(child) == "stop" for child in element)
-    return _Chain(element if has_stops else chain.stops, {**chain.attributes, **own})
+def _is_stop(element: Element) -> bool:
+    return name_of(element) == "stop"
 
 
 CENTRE = (0.0, 0.0, 0.0)
@@ -236,7 +224,7 @@ def _stops(element: Element, document: Document) -> tuple[tuple[float, ...], tup
     """Return the offsets, each at least the one before, and the colours of a gradient's stops."""
     offsets: list[float] = []
     stops: list[FlatColor] = []
-    for child in (child for child in element if name_of(child) == "stop"):
+    for child in filter(_is_stop, element):
         style = document.style_of(child)
         text = child.get("offset", "").strip()
         before = offsets[-1] if offsets else 0.0
