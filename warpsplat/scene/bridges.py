@@ -7,21 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from warpsplat.portable import elementary
-from warpsplat.scene.attributes import Rule
 from warpsplat.scene.connected import parts_of
 from warpsplat.scene.cutout import difference
 from warpsplat.scene.scene import Scene
-from warpsplat.scene.simple import (
-    LEAST,
-    PAINTED,
-    Floats,
-    free_fills,
-    merged,
-    polygon,
-    polygon_ring,
-    rings_of,
-    with_rings,
-)
+from warpsplat.scene.simple import Floats, free_fills, least_area, merged, polygon, polygon_ring, with_rings
 
 
 def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
@@ -35,7 +24,7 @@ def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
         per_pixel: As for ``simple``.
         width: Of a bridge [px].
     """
-    least = LEAST * per_pixel * per_pixel
+    least = least_area(per_pixel)
     made: dict[int, list[Floats]] = {shape: [] for shape in free_fills(scene)}
     for shape, outer, holes in _parts(scene, per_pixel):
         left = [outer, *holes]
@@ -54,10 +43,8 @@ def hole_widths(scene: Scene, per_pixel: float) -> list[float]:
 
 def _parts(scene: Scene, per_pixel: float) -> Iterator[tuple[int, Floats, list[Floats]]]:
     """Yield each connected part of the fills: the shape that it is of, its outer ring, its holes."""
-    least = LEAST * per_pixel * per_pixel
     for shape in free_fills(scene):
-        painted = PAINTED[Rule(scene.rule[shape])]
-        for outer, *holes in parts_of(merged(rings_of(scene, shape, per_pixel), painted, least)):
+        for outer, *holes in parts_of(merged(scene, shape, per_pixel)):
             yield shape, outer, holes
 
 

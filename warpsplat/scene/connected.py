@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.scene.attributes import Rule
 from warpsplat.scene.scene import Scene
-from warpsplat.scene.simple import (
-    LEAST,
-    PAINTED,
-    Floats,
-    area,
-    free_fills,
-    merged,
-    polygon,
-    rings_of,
-    windings,
-    with_rings,
-)
+from warpsplat.scene.simple import Floats, area, free_fills, merged, polygon, windings, with_rings
 
 
 def separated(scene: Scene, per_pixel: float) -> Scene:
@@ -33,9 +21,7 @@ def separated(scene: Scene, per_pixel: float) -> Scene:
         if shape not in free:
             rows.append(shape)
             continue
-        painted = PAINTED[Rule(scene.rule[shape])]
-        rings = merged(rings_of(scene, shape, per_pixel), painted, LEAST * per_pixel * per_pixel)
-        for part in parts_of(rings):
+        for part in parts_of(merged(scene, shape, per_pixel)):
             made[len(rows)] = part
             rows.append(shape)
     return with_rings(scene.take(np.array(rows, np.intp)), made, per_pixel)

@@ -6,21 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpsplat.scene.attributes import Basis, Kind, Paint, Rule
+from warpsplat.scene.attributes import Basis, Kind, Paint
 from warpsplat.scene.scene import Scene
 from warpsplat.scene.simple import (
     GROWN,
-    LEAST,
-    PAINTED,
     Floats,
     Painted,
     free_fills,
     joined,
+    least_area,
     merged,
     moved_left,
     polygon_ring,
     reversed_ring,
-    rings_of,
     with_rings,
 )
 
@@ -35,15 +33,14 @@ def cut_out(scene: Scene, per_pixel: float) -> Scene:
     are rounded as by ``simple``.
     """
     scene = _with_background(scene)
-    least, made = LEAST * per_pixel * per_pixel, dict[int, list[Floats]]()
+    least, made = least_area(per_pixel), dict[int, list[Floats]]()
     above: list[Floats] = []
     size = per_pixel * np.array([scene.canvas.width, scene.canvas.height])
     page = [polygon_ring(size * CORNERS)]
     is_solid = (scene.paint == Paint.FLAT) & (scene.opacities >= 1)
     of_color: dict[bytes, int] = {}
     for shape in reversed(free_fills(scene)):
-        painted = PAINTED[Rule(scene.rule[shape])]
-        rings = merged(rings_of(scene, shape, per_pixel), painted, least)
+        rings = merged(scene, shape, per_pixel)
         if any((ring.min(axis=(0, 1)) < 0).any() or (ring.max(axis=(0, 1)) > size).any() for ring in rings):
             rings = intersection(rings, page, least)
         near, far = _near(above, rings)

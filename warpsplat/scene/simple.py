@@ -22,9 +22,6 @@ from warpsplat.scene.scene import FloatArray, IndexArray, Scene, ranges, starts_
 
 Floats = npt.NDArray[np.float64]
 
-LEAST = 0.1
-"""Area [px²] of rings that are left out: nobody sees them."""
-
 PIECES, SAMPLES = 8, 9
 """Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
 
@@ -46,7 +43,7 @@ def simple(scene: Scene, per_pixel: float) -> Scene:
     Those of shapes that change are cubics, rounded to the grid of a file with ``per_pixel`` units to a pixel,
     as those of the scene should be. Shapes that are filled and stroked, and those of a form, stay.
     """
-    least, made = LEAST * per_pixel * per_pixel, {}
+    least, made = least_area(per_pixel), {}
     for shape in free_fills(scene):
         rings = rings_of(scene, shape, per_pixel)
         changed = simple_rings(rings, PAINTED[Rule(scene.rule[shape])], least)
@@ -121,12 +118,16 @@ def simple_rings(rings: list[Floats], painted: Painted, least: float) -> list[Fl
     return rings
 
 
-def merged(rings: list[Floats], painted: Painted, least: float) -> list[Floats]:
-    """Return simple rings that run around the paint of a shape, where rings share edges, too.
+def merged(scene: Scene, shape: int, per_pixel: float) -> list[Floats]:
+    """Return simple rings around the paint of a fill, as ``rings_of``; rings may share edges, too."""
+    rings = _grown(rings_of(scene, shape, per_pixel))
+    return joined(rings, PAINTED[Rule(scene.rule[shape])], least_area(per_pixel))
 
-    Arguments as for ``simple_rings``.
-    """
-    return joined(_grown(rings), painted, least)
+
+def least_area(per_pixel: float) -> float:
+    """Return the area of rings that are left out because nobody sees them [units²]."""
+    least = 0.1  # [px²]
+    return least * per_pixel * per_pixel
 
 
 def _grown(rings: list[Floats]) -> list[Floats]:

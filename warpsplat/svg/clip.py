@@ -15,7 +15,7 @@ from warpsplat.portable.linear import product
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, about, moved, outline, parse_transform
 from warpsplat.svg.gradients import parse_link
-from warpsplat.svg.paths import Points, Subpath, cubics, line
+from warpsplat.svg.paths import Points, Subpath, cubics, straight
 from warpsplat.svg.shapes import Shape
 from warpsplat.svg.values import SvgViewport, check_length
 
@@ -108,7 +108,7 @@ def _joined(start: Points, end: Points) -> list[Points]:
     """Return a straight cubic between two points, or nothing where they coincide."""
     if np.allclose(start, end, rtol=0, atol=TOLERANCE):
         return []
-    return [np.array([start, *((z.real, z.imag) for z in line(complex(*start), complex(*end)))])]
+    return [np.concatenate([start[None], straight(start, end)])]
 
 
 def _cut(chain: list[Points], at: Points, inward: Points) -> list[Points]:
@@ -168,9 +168,8 @@ def _halves(cubic: Points, t: float) -> tuple[Points, Points]:
 
 def polygon(corners: Points) -> Subpath:
     """Return a closed polygon with these corners, shape (corner, 2)."""
-    ring = [*map(complex, *corners.T), complex(*corners[0])]
-    points = [ring[0], *(z for a, b in pairwise(ring) for z in line(a, b))]
-    return Subpath(np.array([(z.real, z.imag) for z in points]), True, False)
+    sides = (straight(a, b) for a, b in pairwise([*corners, corners[0]]))
+    return Subpath(np.concatenate([corners[:1], *sides]), True, False)
 
 
 def clip_rectangle(link: str, document: Document, matrix: Matrix, viewport: SvgViewport) -> Points | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpsplat.svg.arcs import Floats, as_arcs, as_lines, points_at
 from warpsplat.svg.outlines import color_of, drawn_on_page
-from warpsplat.svg.paths import Subpath, line
+from warpsplat.svg.paths import Subpath
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -106,10 +106,7 @@ def _document(text: str, curves: str, zoom: float) -> Drawing:
 
 def _chain(subpath: Subpath, closed: bool) -> Floats:
     """Return the cubics of a subpath that are longer than nothing, shape (cubic, 4, 2)."""
-    points = subpath.points
-    if closed:  # one that is closed already gets a line without length
-        back = line(complex(*points[-1]), complex(*points[0]))
-        points = np.concatenate([points, [(p.real, p.imag) for p in back]])
+    points = subpath.ring() if closed else subpath.points  # a ring may get a line without length
     first = np.arange(0, len(points) - 1, 3)
     chain = points[first[:, None] + np.arange(4)]
     return np.asarray(chain[np.abs(chain - chain[:, :1]).max(axis=(1, 2)) > NOTHING])

@@ -29,6 +29,10 @@ class Subpath(NamedTuple):
         """Return it under an affine map."""
         return self._replace(points=product(self.points, linear.T) + shift)
 
+    def ring(self) -> Points:
+        """Return its points and a straight cubic back to the start."""
+        return np.concatenate([self.points, straight(self.points[-1], self.points[0])])
+
     def controls(self) -> Points:
         """Return the control points of the quadratics, shape (quadratic, 2)."""
         return 1.5 * self.points[1::3] - 0.5 * self.points[:-1:3]
@@ -193,3 +197,8 @@ def _is_near(a: float, b: float) -> bool:
 def line(start: complex, end: complex) -> list[complex]:
     """Return a straight cubic without its first point."""
     return [start + (end - start) / 3, start + 2 / 3 * (end - start), end]
+
+
+def straight(start: Points, end: Points) -> Points:
+    """Return a straight cubic without its first point, shape (3, 2)."""
+    return np.array([(z.real, z.imag) for z in line(complex(*start), complex(*end))])

@@ -38,7 +38,7 @@ from warpsplat.svg.forms import read_form
 from warpsplat.svg.gradients import FlatColor, Gradient
 from warpsplat.svg.inspect import NAMESPACE, svg_size
 from warpsplat.svg.paints import unused
-from warpsplat.svg.paths import Points, Subpath, line
+from warpsplat.svg.paths import Points, Subpath
 from warpsplat.svg.shapes import Shape, opacity_of
 from warpsplat.svg.structure import Kept, Part, read_parts, shapes_of
 from warpsplat.svg.viewer import premultiplied, render_svg
@@ -51,8 +51,7 @@ def _ring(subpath: Subpath) -> Points:
     """Return a closed ring of cubics, without the repeated end."""
     points = subpath.points
     if not np.allclose(points[-1], points[0], rtol=0, atol=1e-6):
-        closing = line(complex(*points[-1]), complex(*points[0]))
-        points = np.concatenate([points, [(p.real, p.imag) for p in closing]])
+        points = subpath.ring()
     return points[:-1]
 
 
