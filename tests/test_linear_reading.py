@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.svg.foreign import load_scene
 from warpsplat.errors import ImageError
 from warpsplat.scene import Scene
 from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.inspect import inspect_svg, path_nodes, read_svg_text, svg_size
-from warpsplat.svg.read import load_kept, load_scene
+from warpsplat.svg.read import load_kept
 
 LONG = 1_000_000
 SPACES, DIGITS = " " * LONG, "1" * LONG

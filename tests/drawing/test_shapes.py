@@ -23,6 +23,7 @@ from tests.drawing.drawings import (
     star,
 )
 from tests.drawing.test_fit_outlines import assert_clean, psnr
+from tests.svg.foreign import load_scene
 from warpsplat.drawing import prices
 from warpsplat.drawing.constraints import Drawing
 from warpsplat.drawing.fit_outlines import OutlineFit
@@ -34,7 +35,6 @@ from warpsplat.rendering.renderer import render
 from warpsplat.scene import Canvas, Paint
 from warpsplat.scene.attributes import Joint
 from warpsplat.svg.primitives import Primitive, primitives
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import rounded as rounded_scene
 from warpsplat.svg.write import write_svg
 

@@ -11,6 +11,7 @@ import pytest
 from tests.fit.pictures import picture
 from tests.runs import scored, vectorize
 from tests.scenes import mixed_scene
+from tests.svg.foreign import load_scene
 from warpsplat.fit.problem import Start
 from warpsplat.fit.progress import Progress
 from warpsplat.fit.schedule import Phase
@@ -22,7 +23,6 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import FloatArray, Scene
 from warpsplat.scene.scene import level_ends
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg
 
 

@@ -12,6 +12,7 @@ import pytest
 from tests.fit.pictures import picture, step_for
 from tests.runs import vectorize
 from tests.scenes import random_scene, with_stops
+from tests.svg.foreign import load_scene
 from warpsplat.errors import UsageError
 from warpsplat.fit.options import parse_palette
 from warpsplat.fit.paints import choose_paints, with_ramps, without_gradients
@@ -24,7 +25,6 @@ from warpsplat.rendering.renderer import render
 from warpsplat.run.options import settings_from
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Canvas, FloatArray, Kind, Paint, Scene
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 
 COLOR = re.compile(r'(?:fill|stroke)="(#[0-9a-f]{3,6})"')

@@ -10,6 +10,7 @@ import pytest
 
 from tests.fit.pictures import picture, step_for
 from tests.scenes import CURVES, disc, mixed_scene, random_scene, started_alike
+from tests.svg.foreign import load_scene
 from warpsplat.fit import rounding
 from warpsplat.fit.clear import clear_empty
 from warpsplat.fit.export import export
@@ -23,7 +24,6 @@ from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.models import ExactModel
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import OPACITY_RANGE, Basis, Canvas, Kind, Scene
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import premultiplied, render_own
 from warpsplat.svg.write import GRIDS, rounded
 

@@ -15,9 +15,9 @@ from tests.fuzz.vocabulary import (
     PAINTS,
     WIDTH,
 )
+from tests.svg.foreign import load_scene
 from warpsplat.errors import ImageError, explain
 from warpsplat.metrics import psnr
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own
 from warpsplat.svg.write import write_svg
 

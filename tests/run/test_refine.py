@@ -11,7 +11,7 @@ import pytest
 from tests.fit.pictures import picture
 from tests.runs import scored
 from tests.scenes import random_scene
-from tests.svg.foreign import FOREIGN, HEAD
+from tests.svg.foreign import FOREIGN, HEAD, load_scene
 from warpsplat.fit.problem import Problem, Run
 from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
@@ -21,7 +21,7 @@ from warpsplat.run.paper import Paper
 from warpsplat.run.refine import refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
-from warpsplat.svg.read import load_kept, load_scene
+from warpsplat.svg.read import load_kept
 from warpsplat.svg.viewer import on_white, premultiplied, render_svg
 from warpsplat.svg.write import write_svg
 

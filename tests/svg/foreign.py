@@ -1,4 +1,9 @@
-"""SVGs that others might have drawn."""
+"""SVGs that others might have drawn, and how tests read them."""
+
+from __future__ import annotations
+
+from warpsplat.scene import Scene
+from warpsplat.svg.read import load_kept
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 
@@ -16,3 +21,9 @@ FOREIGN = {
     "place": 'width="80" height="60" viewBox="10 0 20 30" preserveAspectRatio="xMinYMax">'
     '<circle cx="50%" cy="1e1" r="9"/></svg>',
 }
+
+
+def load_scene(text: str, width: int, height: int, name: str) -> tuple[Scene, bool]:
+    """Return the scene of an SVG, in which nothing is kept as a picture, and whether it has a background."""
+    read = load_kept(text, width, height, name, keep=False)
+    return read.scene, read.has_background

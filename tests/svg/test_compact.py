@@ -10,12 +10,11 @@ import pytest
 
 from tests.drawing.drawings import BLUE, GOLD, RED, ROUND, WHITE, Outline, disc, drawing, logo, polygon, star
 from tests.scenes import mixed_scene
-from tests.svg.foreign import HEAD
+from tests.svg.foreign import HEAD, load_scene
 from warpsplat.scene import Basis, Canvas, Kind, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.parts import in_parts
 from warpsplat.svg.primitives import Primitive, primitives
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.sizes import estimated_size
 from warpsplat.svg.viewer import render_own, render_svg
 from warpsplat.svg.write import rounded, write_svg

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.svg.foreign import load_scene
 from warpsplat.errors import ImageError
 from warpsplat.svg.dxf import CURVES, TOLERANCE, draw_dxf
 from warpsplat.svg.page import on_sheet, sheet_for
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.write import write_svg
 
 pytest.importorskip("ezdxf")

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from tests.cli.helpers import one_line
-from tests.svg.foreign import FOREIGN, HEAD, ROUND
+from tests.svg.foreign import FOREIGN, HEAD, ROUND, load_scene
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
 from warpsplat.scene import Scene
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import write_svg
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.drawing.drawings import logo, seam
 from tests.scenes import CURVES, mixed_scene, ragged_scene, random_scene, started_alike, with_gradients
-from tests.svg.foreign import ROUND, SMALL
+from tests.svg.foreign import ROUND, SMALL, load_scene
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
@@ -27,7 +27,6 @@ from warpsplat.svg.commands import (
 )
 from warpsplat.svg.data import cubic_data
 from warpsplat.svg.paths import cubics
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, premultiplied, render_own, render_svg
 from warpsplat.svg.write import GRIDS, rounded, write_svg
 

@@ -8,11 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tests.svg.foreign import HEAD, ROUND
+from tests.svg.foreign import HEAD, ROUND, load_scene
 from warpsplat.metrics import psnr
 from warpsplat.svg.arcs import Vertices, as_arcs, as_lines, points_at
 from warpsplat.svg.paths import cubics
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 

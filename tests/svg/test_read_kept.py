@@ -13,12 +13,12 @@ import resvg_py
 from PIL import Image
 
 from tests.fuzz.corpus import saved
-from tests.svg.foreign import HEAD
+from tests.svg.foreign import HEAD, load_scene
 from warpsplat.errors import ImageError
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.svg.read import load_kept, load_scene
+from warpsplat.svg.read import load_kept
 from warpsplat.svg.viewer import on_white
 from warpsplat.svg.write import write_svg
 

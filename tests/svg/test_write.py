@@ -17,6 +17,7 @@ from PIL import Image
 
 from tests.drawing.drawings import logo
 from tests.scenes import CURVES, disc, mixed_scene, random_scene, with_gradients
+from tests.svg.foreign import load_scene
 from warpsplat.files.output import may_replace
 from warpsplat.metrics import psnr
 from warpsplat.rendering.backend import Backend
@@ -26,7 +27,6 @@ from warpsplat.svg.data import integers, path_data
 from warpsplat.svg.inspect import NAMESPACE
 from warpsplat.svg.numbers import data_uri, hex_colors, number
 from warpsplat.svg.paths import cubics
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_own, render_svg
 from warpsplat.svg.write import (
     GRIDS,

@@ -13,13 +13,13 @@ import torch
 import warpsplat
 from tests.fit.pictures import picture
 from tests.scenes import random_scene, with_gradients
+from tests.svg.foreign import load_scene
 from warpsplat import CustomLoss
 from warpsplat.errors import UsageError
 from warpsplat.fit.custom_loss import evaluate
 from warpsplat.fit.settings import make_settings
 from warpsplat.scene import FloatArray, Kind, Paint, Scene
 from warpsplat.scene.attributes import OPACITY_RANGE
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.torch import Module, SceneTensors, render
 

@@ -94,23 +94,6 @@ def is_background(shape: Shape, area: Points) -> bool:
     return bool(upright and (low <= area[0] + 0.5).all() and (high >= area[1] - 0.5).all())
 
 
-def load_scene(
-    text: str, width: int, height: int, name: str, *, background_apart: bool = True
-) -> tuple[Scene, bool]:
-    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
-
-    With ``background_apart``, a background becomes the canvas's, rather than a shape.
-
-    Returns:
-        The scene, and whether the SVG has a background; if not, the scene's is white.
-
-    Raises:
-        ImageError: Not an SVG, nothing drawn, or something that the scene cannot hold.
-    """
-    read = load_kept(text, width, height, name, background_apart=background_apart, keep=False)
-    return read.scene, read.has_background
-
-
 def scene_of(
     shapes: list[Shape], width: int, height: int, background_apart: bool = True, forms: bool = False
 ) -> tuple[Scene, bool]:
@@ -224,12 +207,22 @@ def load_kept(
     keep: bool = True,
     forms: bool = False,
 ) -> KeptScene:
-    """Read an SVG as ``load_scene`` does, but ``keep`` elements that it refuses, as pictures.
+    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
 
-    ``forms``: whether circles, polygons ... are forms (``warpsplat.forms``), rather than curves.
+    Args:
+        text: The SVG.
+        width: Width of the canvas.
+        height: Height of the canvas.
+        name: What messages call the SVG.
+        background_apart: Whether a background becomes the canvas's, rather than a shape.
+        keep: Whether elements that no shape can hold become pictures, rather than errors.
+        forms: Whether circles, polygons ... are forms (``warpsplat.forms``), rather than curves.
+
+    Returns:
+        The scene, whose background is white if the SVG has none, and what it was read from.
 
     Raises:
-        ImageError: Not an SVG, no part that shapes can hold, or something that cannot be kept either.
+        ImageError: Not an SVG, nothing drawn, or something that the scene cannot hold.
     """
     try:
         parts, document = read_parts(text, width, height, keep=keep)

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.drawing.trace.drawings import as_file, photograph
+from tests.svg.foreign import load_scene
 from warpsplat.drawing.trace import pixels
 from warpsplat.drawing.trace.lattice import find_lattice
 from warpsplat.drawing.trace.pixels import trace_pixels
@@ -18,7 +19,6 @@ from warpsplat.drawing.trace.subject import guess_subject
 from warpsplat.errors import ImageError
 from warpsplat.metrics import score_svg
 from warpsplat.scene import FloatArray
-from warpsplat.svg.read import load_scene
 from warpsplat.svg.viewer import on_white, render_svg
 from warpsplat.svg.write import write_svg
 
