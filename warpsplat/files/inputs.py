@@ -23,12 +23,7 @@ def input_name(path: Path) -> str:
 
 
 def read_input(path: Path, what: str = "an image", *, limit: int = MAX_INPUT) -> bytes:
-    """Return all bytes of a file, or of the standard input for ``-``.
-
-    Args:
-        path: The file.
-        what: What it should be, for messages: "an image", "an SVG".
-        limit: Most bytes to read.
+    """Return all bytes of a file, or of the standard input for ``-``; ``what`` messages say it should be.
 
     Raises:
         ImageError: Missing, a folder, not permitted, a device, empty, or more than ``limit`` bytes.

@@ -33,11 +33,9 @@ _unfinished: set[str] = set()
 def check_output(path: Path, *sources: Path, endings: tuple[str, ...] = (), overwrite: bool = True) -> None:
     """Check before the work whether ``path`` can be written; ``-``, the standard output, always can.
 
-    Args:
-        path: The result.
-        sources: Files that it must not replace.
-        endings: Endings of which the name must have one, such as ``.svg``; empty: any.
-        overwrite: Whether a file that warpsplat did not write may be replaced.
+    ``sources``: files that it must not replace; ``endings``: of which the name must have one, such as
+    ``.svg``, unless there are none; ``overwrite``: whether a file that warpsplat did not write may be
+    replaced.
 
     Raises:
         UsageError: The folder is missing or not writable, or ``path`` is no regular file, one of ``sources``,

@@ -85,9 +85,8 @@ def remote(url: str) -> Path:
 def find_remote(url: str, endings: tuple[str, ...]) -> tuple[list[Path], Path]:
     """Return the images behind a URL, sorted, and the folder that they were searched in.
 
-    Args:
-        url: URL of one image, a folder, or with ``*``, ``?``, ``[`` a pattern; a query belongs to the name.
-        endings: Endings of images in a folder.
+    The URL is that of one image, a folder, or with ``*``, ``?``, ``[`` a pattern; a query belongs to the
+    name. ``endings``: of images in a folder.
 
     Raises:
         UsageError: The store does not answer, or the pattern is invalid.

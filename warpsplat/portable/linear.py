@@ -62,11 +62,7 @@ def _eliminated(matrix: Matrices, right: Result) -> tuple[Result, Result, Result
 
 
 def solve(matrix: Matrices, right: Matrices) -> Result:
-    """Return ``x`` of ``matrix @ x = right``.
-
-    Args:
-        matrix: Square matrices, shape (..., n, n).
-        right: A vector (n,), or matrices (..., n, k).
+    """Return ``x`` of ``matrix @ x = right``, for square matrices and a vector (n,) or matrices (..., n, k).
 
     Raises:
         np.linalg.LinAlgError: A matrix is singular.

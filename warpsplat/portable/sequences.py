@@ -11,13 +11,7 @@ import numpy.typing as npt
 def interp(x: Any, places: Any, values: Any) -> npt.NDArray[np.float64]:
     """Return a piecewise linear function at ``x``, held constant beyond its ends, as ``np.interp``.
 
-    Args:
-        x: Arguments, any shape.
-        places: Arguments with given values, shape (n,), ascending.
-        values: The values there, shape (n, ...).
-
-    Returns:
-        The shape of ``x``, with what ``values`` have after it.
+    It has ``values`` (n, ...) at ``places`` (n,), ascending. The shape is that of ``x``, any, and (...).
     """
     x, places, values = (np.asarray(part, np.float64) for part in (x, places, values))
     if len(places) == 1:

@@ -123,10 +123,10 @@ class Attribute:
     """Numbers in a row."""
     rate: float
     """Adam's learning rate at the start."""
-    rate_unit: Unit
-    low: tuple[float, Unit]
+    rate_unit: Unit = Unit.ONE
+    low: tuple[float, Unit] = (0.0, Unit.ONE)
     """Least value."""
-    high: tuple[float, Unit]
+    high: tuple[float, Unit] = (1.0, Unit.ONE)
     """Largest value."""
     kinds: tuple[Kind, ...] = (Kind.FILL, Kind.STROKE)
     """The shapes that have it; for others it is 0 and not updated."""
@@ -170,19 +170,17 @@ GRADIENTS = (Paint.LINEAR, Paint.RADIAL)
 
 ATTRIBUTES = (
     Attribute("points", "point", 2, 3.0, Unit.PIXEL, (-1.0, Unit.CANVAS), (2.0, Unit.CANVAS)),
-    Attribute("colors", "shape", 3, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE)),
+    Attribute("colors", "shape", 3, 0.02),
     Attribute(
-        "opacities", "shape", 1, 0.04, Unit.ONE, (OPACITY_RANGE[0], Unit.ONE), (OPACITY_RANGE[1], Unit.ONE)
+        "opacities", "shape", 1, 0.04, low=(OPACITY_RANGE[0], Unit.ONE), high=(OPACITY_RANGE[1], Unit.ONE)
     ),
     Attribute(
         "frames", "shape", 6, 1.0, Unit.PIXEL, (-9.0, Unit.CANVAS), (9.0, Unit.CANVAS), paints=GRADIENTS
     ),
-    Attribute("focus", "shape", 3, 0.0, Unit.ONE, (-1.0, Unit.ONE), (1.0, Unit.ONE), paints=(Paint.RADIAL,)),
-    Attribute("stop_offsets", "stop", 1, 0.01, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS),
-    Attribute("stop_colors", "stop", 3, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS),
-    Attribute(
-        "stop_opacities", "stop", 1, 0.02, Unit.ONE, (0.0, Unit.ONE), (1.0, Unit.ONE), paints=GRADIENTS
-    ),
-    Attribute("fades", "shape", 3, 0.04, Unit.ONE, (-1.0, Unit.ONE), (1.0, Unit.ONE), (Kind.STROKE,)),
+    Attribute("focus", "shape", 3, 0.0, low=(-1.0, Unit.ONE), paints=(Paint.RADIAL,)),
+    Attribute("stop_offsets", "stop", 1, 0.01, paints=GRADIENTS),
+    Attribute("stop_colors", "stop", 3, 0.02, paints=GRADIENTS),
+    Attribute("stop_opacities", "stop", 1, 0.02, paints=GRADIENTS),
+    Attribute("fades", "shape", 3, 0.04, low=(-1.0, Unit.ONE), kinds=(Kind.STROKE,)),
     Attribute("widths", "shape", 1, 0.3, Unit.PIXEL, (1.0, Unit.PIXEL), (1.0, Unit.CANVAS), (Kind.STROKE,)),
 )

@@ -14,15 +14,10 @@ from warpsplat.scene.simple import Floats, free_fills, least_area, merged, polyg
 
 
 def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
-    """Return a scene with bridges over the fills from each hole to what is around the part that it is in.
+    """Return a scene with bridges, ``width`` px wide, over the fills from each hole to what is around it.
 
-    Each hole gets one where the way is shortest, and a short one to the other side. Contours are
-    rounded as by ``simple``.
-
-    Args:
-        scene: What to cut out.
-        per_pixel: As for ``simple``.
-        width: Of a bridge [px].
+    Each hole gets one where the way is shortest, and a short one to the other side. Contours are rounded as
+    by ``simple``.
     """
     least = least_area(per_pixel)
     made: dict[int, list[Floats]] = {shape: [] for shape in free_fills(scene)}

@@ -53,15 +53,10 @@ def flattened(cubics: Floats, pieces: int = 1 << 2 * LEVELS) -> Floats:
 
 
 def intersections(cubics: Floats) -> tuple[IndexArray, Floats]:
-    """Return which cubics cross one another, or themselves, and where.
+    """Return which cubics (cubic, 4, 2) cross one another, or themselves, and where.
 
+    That is pairs of indices, shape (crossing, 2), and the parameters there, in [0, 1], of the same shape.
     Ends on one another are no crossings.
-
-    Args:
-        cubics: Shape (cubic, 4, 2).
-
-    Returns:
-        Pairs of indices, shape (crossing, 2), and the parameters there, in [0, 1], of the same shape.
     """
     pairs, t = _loops(cubics)
     found, where = [pairs], [t]

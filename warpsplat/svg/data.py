@@ -33,8 +33,9 @@ def integers(pairs: Iterable[Pair]) -> str:
 
 Floats = npt.NDArray[np.float64]
 
-THIRD = 0.5 + 1e-9
-"""... and the same for rounded points: as far as rounding moves handles, which moves the outline by less."""
+NEAR_THIRD, ROUNDED_THIRD = 0.05, 0.5 + 1e-9
+"""Largest distances of a line's handles from its thirds, in units of the view box: of exact points, and of
+rounded ones, as far as rounding moves handles, which moves the outline by less."""
 
 
 def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
@@ -45,8 +46,7 @@ def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
     """
     found = np.zeros(len(exact), np.bool_)
     rows = cubic_rows(scene)
-    near_third = 0.05  # largest distance of a line's handles from its thirds, in units of the view box ..
-    for corners, near in ((exact[rows], near_third), (np.round(exact[rows]), THIRD)):
+    for corners, near in ((exact[rows], NEAR_THIRD), (np.round(exact[rows]), ROUNDED_THIRD)):
         vectors = corners[:, 1:] - corners[:, :1]
         chord = vectors[:, 2:]
         handles, thirds = vectors[:, :2], np.array([[1 / 3], [2 / 3]]) * chord
@@ -133,14 +133,10 @@ def path_data(scene: Scene, per_pixel: float) -> Iterator[str]:
 def cubic_data(
     segments: list[Segment], start: Pair, closed: bool, rings: Rings | None, pen: Pair | None
 ) -> tuple[str, Pair]:
-    """Return the path data of a contour of lines and cubics, and where the pen is then.
+    """Return the path data of a contour of lines and cubics from ``start``, and where the pen is then.
 
-    Args:
-        segments: Of the contour.
-        start: Its first point.
-        closed: Whether it is a ring.
-        rings: Of the fill; None for a stroke, where a ring's joint is visible, and its start matters.
-        pen: Where the pen is before, if any.
+    ``rings``: of the fill; None for a stroke, where a ring's joint is visible, and its start matters.
+    ``pen``: where the pen is before, if any.
     """
     if not segments:
         return f"M{integers([start])}z", start

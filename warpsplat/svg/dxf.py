@@ -41,12 +41,7 @@ VERSION, OLD_VERSION = "R2004", "R12"
 def draw_dxf(text: str, curves: str, *, zoom: float = 1.0) -> bytes:
     """Return an SVG's outlines as a DXF, ``zoom`` times as large; the same text gives the same bytes.
 
-    Shapes without opacity, and a background behind everything, are left out.
-
-    Args:
-        text: The SVG.
-        curves: One of ``CURVES``.
-        zoom: The magnification.
+    Shapes without opacity, and a background behind everything, are left out. ``curves``: one of ``CURVES``.
 
     Raises:
         ImageError: As ``drawn_on_page``.

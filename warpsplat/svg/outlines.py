@@ -32,13 +32,8 @@ def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Draw
     """Return what an SVG draws.
 
     Fills end at the page's border, as in a viewer. A group's opacity becomes that of its shapes. Strokes that
-    are stretched have their mean width.
-
-    Args:
-        text: The SVG.
-        units_per_inch: 25.4 for millimetres, 72 for points.
-        background: Whether a rectangle that fills the page, or the picture on it, behind everything is a
-            shape.
+    are stretched have their mean width. ``background``: whether a rectangle that fills the page, or the
+    picture on it, behind everything is a shape.
 
     Raises:
         ImageError: Not an SVG, one of unknown size, or one with something other than fills and strokes.

@@ -76,15 +76,12 @@ class Sheet:
 
 
 def sheet_for(size: str, page: str, unit: str, width: int, height: int) -> Sheet:
-    """Return the sheet that options ask for.
+    """Return the sheet that options ask for, for a picture of ``width`` x ``height``.
 
-    Args:
-        size: A size such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Of a width alone, as in
-            ``200mm``, or a height, ``x150mm``, the other side follows. Empty: none.
-        page: A standard format, with margins, in landscape for a picture wider than high. Empty: none.
-        unit: Unit of the size in the file; empty: millimetres.
-        width: Width of the picture.
-        height: Height of the picture.
+    ``size``: such as ``200x150mm`` or ``8x6in``; without a unit, in ``unit``. Of a width alone, as in
+    ``200mm``, or a height, ``x150mm``, the other side follows. ``page``, if there is no size: a standard
+    format, with margins, in landscape for a picture wider than high. ``unit``: of the size in the file;
+    empty: millimetres.
 
     Raises:
         UsageError: An option is invalid.
@@ -183,7 +180,7 @@ def picture_view(svg: str, width: int, height: int) -> str | None:
     found = VIEW.match(svg)
     if not found:
         return None
-    left, top, across, down = (float(found[i]) for i in range(2, 6))
+    left, top, across, down = map(float, found.groups()[1:])
     spaces = (((across + 2 * left) / width, width), ((down + 2 * top) / height, height))
     low = max(space - 1 / side for space, side in spaces)
     high = min(space + 1 / side for space, side in spaces)
@@ -205,7 +202,7 @@ def picture_area(svg: str) -> tuple[float, float, float, float] | None:
     found = OUR_VIEW.match(svg)
     if not found:
         return None
-    left, top, across, down = (float(found[i]) for i in range(2, 6))
+    left, top, across, down = map(float, found.groups()[1:])
     return -left / across, -top / down, 1 + (left - 1) / across, 1 + (top - 1) / down
 
 
@@ -222,4 +219,4 @@ def on_sheet_of(svg: str, view: str, text: str) -> str:
     sheet = VIEW.match(svg)
     assert sheet
     scale = float(own_head(text)[3]) / float(view.split()[2])
-    return _with_head(text, sheet[1], (scale * float(sheet[i]) for i in range(2, 6)))
+    return _with_head(text, sheet[1], (scale * float(side) for side in sheet.groups()[1:]))

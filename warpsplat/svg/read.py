@@ -207,19 +207,11 @@ def load_kept(
     keep: bool = True,
     forms: bool = False,
 ) -> KeptScene:
-    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units.
+    """Read an SVG's shapes as a scene of ``width`` x ``height`` canvas units, white if it has no background.
 
-    Args:
-        text: The SVG.
-        width: Width of the canvas.
-        height: Height of the canvas.
-        name: What messages call the SVG.
-        background_apart: Whether a background becomes the canvas's, rather than a shape.
-        keep: Whether elements that no shape can hold become pictures, rather than errors.
-        forms: Whether circles, polygons ... are forms (``warpsplat.forms``), rather than curves.
-
-    Returns:
-        The scene, whose background is white if the SVG has none, and what it was read from.
+    ``background_apart``: whether a background becomes the canvas's, rather than a shape. ``keep``: whether
+    elements that no shape can hold become pictures, rather than errors. ``forms``: whether circles, polygons
+    ... are forms (``warpsplat.forms``), rather than curves.
 
     Raises:
         ImageError: Not an SVG, nothing drawn, or something that the scene cannot hold.

@@ -118,14 +118,10 @@ def read_shapes(
 ) -> list[Shape]:
     """Return the shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
 
-    Args:
-        text: The SVG.
-        width: Width of the picture.
-        height: Height of the picture.
-        scale: Magnification; None: the SVG fills the picture, which has its proportions.
-        see_through: Fade overlapping shapes of a translucent group one by one, rather than refuse them.
-        outlines: Accept what changes the look of edges only: ``shape-rendering``, and strokes that a
-            transform stretches, which get their mean width.
+    ``scale``: the magnification; None: the SVG fills the picture, which has its proportions. ``see_through``:
+    fade overlapping shapes of a translucent group one by one, rather than refuse them. ``outlines``: accept
+    what changes the look of edges only: ``shape-rendering``, and strokes that a transform stretches, which
+    get their mean width.
 
     Raises:
         ImageError: Not an SVG, of other proportions, or with something that would be lost.

@@ -96,12 +96,8 @@ class _Paths:
     ) -> None:
         """Write the path data.
 
-        Args:
-            scene: As for ``write_svg``.
-            per_pixel: The same.
-            ramps: Identifiers of gradients by shape.
-            opacity_scale: As for ``write_svg``.
-            symbols: Elements without style, by shape, instead of paths.
+        ``ramps``: identifiers of gradients by shape; ``symbols``: elements without style, by shape, instead
+        of paths; else as for ``write_svg``.
         """
         self._scene, self._per_pixel = scene, per_pixel
         self._data = list(path_data(scene.drawn(), per_pixel))
