@@ -15,8 +15,10 @@ from warpsplat.scene.attributes import Paint as Paint
 from warpsplat.scene.attributes import Rule as Rule
 from warpsplat.scene.attributes import Spread as Spread
 from warpsplat.scene.attributes import Unit as Unit
+from warpsplat.scene.scene import Bools as Bools
 from warpsplat.scene.scene import Canvas as Canvas
 from warpsplat.scene.scene import FloatArray as FloatArray
+from warpsplat.scene.scene import Floats as Floats
 from warpsplat.scene.scene import IndexArray as IndexArray
 from warpsplat.scene.scene import KeptPicture as KeptPicture
 from warpsplat.scene.scene import Scene as Scene

@@ -9,8 +9,8 @@ import numpy as np
 from warpsplat.portable import elementary
 from warpsplat.scene.connected import parts_of
 from warpsplat.scene.cutout import difference
-from warpsplat.scene.scene import Scene
-from warpsplat.scene.simple import Floats, free_fills, least_area, merged, polygon, polygon_ring, with_rings
+from warpsplat.scene.scene import Floats, Scene
+from warpsplat.scene.simple import free_fills, least_area, merged, polygon, polygon_ring, with_rings
 
 
 def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:

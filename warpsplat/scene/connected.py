@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpsplat.scene.scene import Scene
-from warpsplat.scene.simple import Floats, area, free_fills, merged, polygon, windings, with_rings
+from warpsplat.scene.scene import Floats, Scene
+from warpsplat.scene.simple import area, free_fills, merged, polygon, windings, with_rings
 
 
 def separated(scene: Scene, per_pixel: float) -> Scene:

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpsplat.scene.attributes import Basis, Kind, Paint
-from warpsplat.scene.scene import Scene
+from warpsplat.scene.scene import Floats, Scene
 from warpsplat.scene.simple import (
     GROWN,
-    Floats,
     Painted,
     free_fills,
     joined,

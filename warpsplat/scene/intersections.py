@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene.scene import IndexArray, ranges
-
-Floats = npt.NDArray[np.float64]
+from warpsplat.scene.scene import Floats, IndexArray, ranges
 
 LEVELS = 3
 """Times that cubics whose boxes meet are split into four parts; lines take the place of these."""

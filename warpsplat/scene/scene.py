@@ -15,6 +15,8 @@ from warpsplat.forms import form_of
 from warpsplat.scene.attributes import ATTRIBUTES, GRADIENTS, TRAITS, Attribute, Basis, Kind
 
 FloatArray = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 IndexArray = npt.NDArray[np.intp]
 IntArray = npt.NDArray[np.int32]
 
@@ -261,7 +263,7 @@ class Scene:
         """Return the number of control points of each shape, shape (shape,)."""
         return np.diff(self.first)
 
-    def has_twin(self) -> npt.NDArray[np.bool_]:
+    def has_twin(self) -> Bools:
         """Return which shapes share their points with the next one, shape (shape,)."""
         return np.append(self.twin[1:], 0)[: len(self)] == 1
 
@@ -392,7 +394,7 @@ class Scene:
             **values,
         )
 
-    def without_points(self, keep: npt.NDArray[np.bool_]) -> Scene:
+    def without_points(self, keep: Bools) -> Scene:
         """Return the shapes with only the points ``keep``, shape (point,)."""
         left = np.concatenate([[0], np.cumsum(keep)]).astype(np.int32)
         return replace(self, first=left[self.first], starts=left[self.starts], points=self.points[keep])

@@ -12,15 +12,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat.portable import elementary
 from warpsplat.scene.attributes import Basis, Kind, Rule
 from warpsplat.scene.geometry import beziers
 from warpsplat.scene.intersections import cross, flattened, intersections, parts
-from warpsplat.scene.scene import FloatArray, IndexArray, Scene, ranges, starts_of
-
-Floats = npt.NDArray[np.float64]
+from warpsplat.scene.scene import Bools, FloatArray, Floats, IndexArray, Scene, ranges, starts_of
 
 PIECES, SAMPLES = 8, 9
 """Lines that take the place of a cubic where areas are computed, and places where a ring is looked at."""
@@ -28,7 +25,7 @@ PIECES, SAMPLES = 8, 9
 GROWN = 0.02
 """By how much shapes are grown while crossings are looked for [units]: edges that coincide then cross."""
 
-Painted = Callable[[IndexArray], npt.NDArray[np.bool_]]
+Painted = Callable[[IndexArray], Bools]
 """Whether there is paint, by how often contours wind around a place."""
 
 PAINTED: dict[Rule, Painted] = {
@@ -184,7 +181,7 @@ def uncrossed(rings: list[Floats]) -> tuple[list[Floats], list[Floats]]:
     return kept, [part for ring in new for part in _apart(ring)]
 
 
-def _meeting_twice(cubics: Floats, owner: IndexArray) -> npt.NDArray[np.bool_]:
+def _meeting_twice(cubics: Floats, owner: IndexArray) -> Bools:
     """Return which rings have two nodes in common with another one, in which they may cross, (ring,)."""
     count = int(owner[-1]) + 1
     order = np.lexsort((owner, *cubics[:, 0].T))
@@ -295,7 +292,7 @@ def _held(cubic: Floats, row: int, end: Floats) -> Floats:
     return made
 
 
-def _are_lines(cubics: Floats) -> npt.NDArray[np.bool_]:
+def _are_lines(cubics: Floats) -> Bools:
     """Return which cubics have their handles at the thirds of a line."""
     steps = np.diff(cubics[..., :2], axis=1)
     uneven = 0.01  # by how much the thirds of a line may differ [units]: more than single precision does

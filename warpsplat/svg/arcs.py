@@ -12,10 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from warpsplat.scene import Bools, Floats
 
 SAMPLES = np.arange(1, 8) / 8
 """Where distances are measured, in the parameter of a curve."""

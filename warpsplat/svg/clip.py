@@ -7,19 +7,17 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from warpsplat.errors import ImageError
 from warpsplat.portable.elementary import hypot
 from warpsplat.portable.linear import product
+from warpsplat.scene import Bools
 from warpsplat.svg.document import Document, Element, name_of
 from warpsplat.svg.geometry import Matrix, about, moved, outline, parse_transform
 from warpsplat.svg.gradients import parse_link
 from warpsplat.svg.paths import Points, Subpath, cubics, straight
 from warpsplat.svg.shapes import Shape
 from warpsplat.svg.values import SvgViewport, check_length
-
-Bools = npt.NDArray[np.bool_]
 
 TOLERANCE = 1e-6
 """Distance [px] from a line within which a point lies on it."""

@@ -9,9 +9,8 @@ import itertools
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene import Basis, IndexArray, Kind, Scene
+from warpsplat.scene import Basis, Bools, Floats, IndexArray, Kind, Scene
 from warpsplat.svg.commands import (
     SMALL,
     Pair,
@@ -31,14 +30,12 @@ def integers(pairs: Iterable[Pair]) -> str:
     return " ".join([f"{x} {y}" for x, y in pairs]).replace(" -", "-")
 
 
-Floats = npt.NDArray[np.float64]
-
 NEAR_THIRD, ROUNDED_THIRD = 0.05, 0.5 + 1e-9
 """Largest distances of a line's handles from its thirds, in units of the view box: of exact points, and of
 rounded ones, as far as rounding moves handles, which moves the outline by less."""
 
 
-def straight_cubics(scene: Scene, exact: Floats) -> npt.NDArray[np.bool_]:
+def straight_cubics(scene: Scene, exact: Floats) -> Bools:
     """Return which cubics a file shows as straight lines, by their first points, shape (point,).
 
     Those are cubics with handles at the thirds, or with rounded handles on the line. ``exact``: the points in

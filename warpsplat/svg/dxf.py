@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpsplat.svg.arcs import Floats, as_arcs, as_lines, points_at
+from warpsplat.scene import Floats
+from warpsplat.svg.arcs import as_arcs, as_lines, points_at
 from warpsplat.svg.outlines import color_of, drawn_on_page
 from warpsplat.svg.paths import Subpath
 

@@ -10,9 +10,8 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene import FloatArray, IndexArray, Kind, Scene
+from warpsplat.scene import Bools, FloatArray, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import bounds
 from warpsplat.scene.scene import level_ends
 
@@ -53,7 +52,7 @@ def _by(scene: Scene, keys: Sequence[tuple[int, float]]) -> IndexArray:
 def _arrange(boxes: FloatArray, keys: Sequence[tuple[int, float]]) -> list[int]:
     """Return the order of shapes with these boxes and keys."""
     low, high = boxes[:, :2] - MARGIN / 2, boxes[:, 2:] + MARGIN / 2
-    overlap: npt.NDArray[np.bool_] = np.all((low[:, None] < high[None]) & (low[None] < high[:, None]), axis=2)
+    overlap: Bools = np.all((low[:, None] < high[None]) & (low[None] < high[:, None]), axis=2)
     above = [(np.flatnonzero(overlap[i, i + 1 :]) + i + 1).tolist() for i in range(len(keys))]
     below = np.triu(overlap, 1).sum(axis=0).tolist()
     """Number of unpainted shapes under each."""

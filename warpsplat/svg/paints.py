@@ -6,13 +6,10 @@ import math
 import re
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene import GRADIENTS, Paint, Scene, Spread
+from warpsplat.scene import GRADIENTS, Floats, Paint, Scene, Spread
 from warpsplat.svg.forms import gradient_frames
 from warpsplat.svg.numbers import hex_colors, number
-
-Floats = npt.NDArray[np.float64]
 
 SHARE_DECIMALS = 3
 """Decimals of offsets and of positions in a gradient's unit space: a thousandth of its extent."""

@@ -10,15 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene import Basis, IndexArray, Kind, Scene
+from warpsplat.scene import Basis, Bools, Floats, IndexArray, Kind, Scene
 from warpsplat.scene.geometry import ARC_HANDLE
 from warpsplat.scene.scene import numbers_in
 from warpsplat.svg.commands import Pair, minus, row
 from warpsplat.svg.numbers import number
-
-Floats = npt.NDArray[np.float64]
 
 NEAR = 0.01
 """Largest distance of an exact outline's points from their places, in units of the view box: single precision
@@ -104,13 +101,13 @@ def _ends(x0: Any, y0: Any, x1: Any, y1: Any, rx: Any, ry: Any) -> list[tuple[An
     return [*upper, (x1, y1 - ry), (x1 - rx, y1), (x0 + rx, y1), (x0, y1 - ry)]
 
 
-def _are_round(boxes: Floats) -> npt.NDArray[np.bool_]:
+def _are_round(boxes: Floats) -> Bools:
     """Return ``Primitive.is_round`` of boxes, shape (box, 2)."""
     radii = boxes[:, 4:]
     return np.asarray((radii > 0) & (boxes[:, 2:4] - boxes[:, :2] - 2 * radii < NEAR))
 
 
-def _cubics(boxes: Floats, clockwise: npt.NDArray[np.bool_]) -> Iterator[tuple[IndexArray, Floats]]:
+def _cubics(boxes: Floats, clockwise: Bools) -> Iterator[tuple[IndexArray, Floats]]:
     """Yield which boxes have the same kinds of pieces, and these, shape (box, piece, 4, 2).
 
     ``boxes``: lows, highs and radii, shape (box, 6).
@@ -148,9 +145,7 @@ def primitives(scene: Scene, exact: Floats, *, whole: bool = False) -> Iterator[
             yield contour, Primitive((x0, y0), (x1, y1), (rx, ry), is_clockwise)
 
 
-def _alike(
-    scene: Scene, exact: Floats
-) -> Iterator[tuple[IndexArray, Floats, npt.NDArray[np.bool_], IndexArray]]:
+def _alike(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, Floats, Bools, IndexArray]]:
     """Yield contours of equally many points that are ellipses or rectangles, and what these are.
 
     That is their lows, highs and radii, shape (outline, 6), whether they are clockwise, and by how many
@@ -177,7 +172,7 @@ def _alike(
         yield group.contours[chosen[near]], boxes[near], clockwise[near], turned
 
 
-def _turned(boxes: Floats, clockwise: npt.NDArray[np.bool_], points: Floats) -> tuple[IndexArray, IndexArray]:
+def _turned(boxes: Floats, clockwise: Bools, points: Floats) -> tuple[IndexArray, IndexArray]:
     """Return which boxes the outlines (outline, point, 2) are, and by how many points those start later."""
     count = points.shape[1]
     near, turned = np.zeros(len(boxes), np.bool_), np.zeros(len(boxes), np.intp)
@@ -195,7 +190,7 @@ def _begun(rings: Floats, first: IndexArray) -> Floats:
     return np.take_along_axis(rings, rows[..., None], axis=1)
 
 
-def _rounded(boxes: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _rounded(boxes: Floats) -> tuple[Floats, Bools]:
     """Return boxes in whole numbers, and of which of them something is left."""
     low, high, exact = boxes[:, :2], boxes[:, 2:4], boxes[:, 4:]
     radii, middle, is_round = np.round(exact), np.round((low + high) / 2), _are_round(boxes)
@@ -221,7 +216,7 @@ def held_primitives(scene: Scene, exact: Floats) -> Iterator[tuple[IndexArray, F
                 yield starts[:, None] + np.arange(rings.shape[1]), _begun(rings, turned[own])
 
 
-def held_rounds(scene: Scene, per_pixel: float) -> npt.NDArray[np.bool_]:
+def held_rounds(scene: Scene, per_pixel: float) -> Bools:
     """Return which points belong to ellipses and rounded rectangles, shape (point,)."""
     found = np.zeros(len(scene.points), np.bool_)
     for rows, _ in held_primitives(scene, scene.points.astype(np.float64) * per_pixel):

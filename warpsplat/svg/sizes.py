@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from warpsplat.scene import Scene
+from warpsplat.scene import Floats, Scene
 from warpsplat.scene.scene import starts_of
 from warpsplat.svg.data import cubic_rows, straight_cubics, units
 from warpsplat.svg.paints import gradients
 from warpsplat.svg.primitives import primitives
-
-Floats = npt.NDArray[np.float64]
 
 HEAD, PATH, MOVE = 130, 32, 2
 """Characters of the file's beginning and end, of a path but for its data, and the letters of a contour's

@@ -6,9 +6,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from warpsplat.scene import Basis, IndexArray, Kind, Paint, Scene
+from warpsplat.scene import Basis, Floats, IndexArray, Kind, Paint, Scene
 from warpsplat.scene.simple import area
 from warpsplat.svg.data import path_data, units
 from warpsplat.svg.paints import unused
@@ -87,7 +86,7 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
     return with_parts(scene, split), "".join(definitions), elements
 
 
-def _data_of(scene: Scene, part: IndexArray, origin: npt.NDArray[np.float64], per_pixel: float) -> str:
+def _data_of(scene: Scene, part: IndexArray, origin: Floats, per_pixel: float) -> str:
     """Return the path data of a part with its first point at 0."""
     shape = int(scene.contour_shapes()[part[0]])
     own = part - scene.first_contours()[shape]
