@@ -74,35 +74,6 @@ DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 """Elements that are shapes."""
 
 
-def element_style(element: Element, rules: Sequence[Declaration], parent: Style) -> Style:
-    """Return all properties of an element, given the ``rules`` that apply to it, the strongest last.
-
-    Raises:
-        ImageError: A property has a value that shapes cannot show.
-    """
-    style = {**parent, **OWN}
-    for name, value in _cascade(element.attrib, rules).items():
-        if len(element) and name in INHERITED:
-            check_length(name, value)
-        if name in GEOMETRY:
-            if local_name(element) in DRAWN:
-                raise ImageError(f"sets {name} by style, not supported")
-        elif "var(" in value:
-            raise ImageError("uses variables in style, not supported")
-        elif value == "inherit" or (value == "unset" and name in INHERITED):
-            style[name] = parent[name]
-        elif value in {"initial", "unset"}:
-            style[name] = ROOT[name]
-        elif name == "font-size":
-            style[name] = repr(_font_size(value, float(parent[name])))
-        else:
-            style[name] = value
-    for name in ("mask", "filter", "mix-blend-mode"):
-        if style[name] != OWN[name]:
-            raise ImageError(f"uses {name}, not supported")
-    return style
-
-
 def _cascade(attributes: Mapping[str, str], rules: Sequence[Declaration]) -> Style:
     """Return the values given to an element itself (CSS 2.1, 6.4).
 
@@ -212,7 +183,28 @@ class Document:
         Raises:
             ImageError: A property has a value that shapes cannot show.
         """
-        return element_style(element, self._sheet.of(element, self.parents), parent)
+        rules = self._sheet.of(element, self.parents)
+        style = {**parent, **OWN}
+        for name, value in _cascade(element.attrib, rules).items():
+            if len(element) and name in INHERITED:
+                check_length(name, value)
+            if name in GEOMETRY:
+                if local_name(element) in DRAWN:
+                    raise ImageError(f"sets {name} by style, not supported")
+            elif "var(" in value:
+                raise ImageError("uses variables in style, not supported")
+            elif value == "inherit" or (value == "unset" and name in INHERITED):
+                style[name] = parent[name]
+            elif value in {"initial", "unset"}:
+                style[name] = ROOT[name]
+            elif name == "font-size":
+                style[name] = repr(_font_size(value, float(parent[name])))
+            else:
+                style[name] = value
+        for name in ("mask", "filter", "mix-blend-mode"):
+            if style[name] != OWN[name]:
+                raise ImageError(f"uses {name}, not supported")
+        return style
 
     def style_of(self, element: Element) -> Style:
         """Return all properties of an element at its place in the document; raises as ``style_in``."""

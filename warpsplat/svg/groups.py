@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from PIL import ImageColor
 
-from warpsplat.scene import FloatArray, Paint, Scene
+from warpsplat.scene import Paint, Scene
 
 GRADIENT = "gradient"
 """Identifier of paths that have no single colour."""
@@ -38,17 +38,12 @@ class Names:
 
 
 def color_names(scene: Scene) -> list[str]:
-    """Return a name for each shape's paint: the nearest CSS colour's, or ``GRADIENT``."""
-    paints = zip(_nearest(scene.colors), scene.paint.tolist(), strict=True)
-    return [color if paint == Paint.FLAT else GRADIENT for color, paint in paints]
-
-
-def _nearest(colors: FloatArray) -> list[str]:
-    """Return the names of the CSS colours nearest in sRGB to ``colors``, shape (n, 3)."""
+    """Return a name for each shape's paint: that of the CSS colour nearest in sRGB, or ``GRADIENT``."""
     known = list(ImageColor.colormap)
     table = np.array([ImageColor.getrgb(name) for name in known]) / 255
-    squares = ((colors[:, None] - table) ** 2).sum(axis=2)
-    return [known[i] for i in squares.argmin(axis=1).tolist()]
+    nearest = ((scene.colors[:, None] - table) ** 2).sum(axis=2).argmin(axis=1).tolist()
+    is_flat = (scene.paint == Paint.FLAT).tolist()
+    return [known[i] if flat else GRADIENT for i, flat in zip(nearest, is_flat, strict=True)]
 
 
 @dataclass(frozen=True)

@@ -239,6 +239,13 @@ def view_box(root: Mapping[str, str]) -> tuple[float, float, float, float] | Non
     return (x, y, width, height) if is_valid else None
 
 
+def known_size(root: Mapping[str, str]) -> tuple[float, float]:
+    """Return ``svg_size``, or raise ``ImageError`` if the root does not state it."""
+    if size := svg_size(root):
+        return size
+    raise ImageError("has neither its size nor a viewBox")
+
+
 def svg_size(root: Mapping[str, str]) -> tuple[float, float] | None:
     """Return the size [px] at which resvg shows an SVG, given the attributes of its root.
 

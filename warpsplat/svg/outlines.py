@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpsplat.errors import ImageError
 from warpsplat.svg.clip import clipped
 from warpsplat.svg.gradients import FlatColor
-from warpsplat.svg.inspect import inspect_svg, svg_size
+from warpsplat.svg.inspect import inspect_svg, known_size
 from warpsplat.svg.page import picture_area
 from warpsplat.svg.read import is_background
 from warpsplat.svg.shapes import Shape, opacity_of
@@ -38,10 +37,7 @@ def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Draw
     Raises:
         ImageError: Not an SVG, one of unknown size, or one with something other than fills and strokes.
     """
-    size = svg_size(inspect_svg(text).root)
-    if size is None:
-        raise ImageError("has neither its size nor a viewBox")
-    width, height = size
+    width, height = known_size(inspect_svg(text).root)
     shapes = read_shapes(text, 0, 0, 1.0, see_through=True, outlines=True)
     left, top, right, bottom = picture_area(text) or (0.0, 0.0, 1.0, 1.0)
     area = np.array([[left * width, top * height], [right * width, bottom * height]])

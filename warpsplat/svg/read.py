@@ -36,7 +36,7 @@ from warpsplat.svg.document import Document, name_of
 from warpsplat.svg.excerpts import Excerpts
 from warpsplat.svg.forms import read_form
 from warpsplat.svg.gradients import FlatColor, Gradient
-from warpsplat.svg.inspect import NAMESPACE, svg_size
+from warpsplat.svg.inspect import NAMESPACE, known_size
 from warpsplat.svg.paints import unused
 from warpsplat.svg.paths import Points, Subpath
 from warpsplat.svg.shapes import Shape, opacity_of
@@ -266,8 +266,7 @@ def _with_pictures(
     root = document.style_of(document.root)
     if root["transform"] != "none":
         raise ImageError("has a transform on its root, which cannot be kept")
-    size = svg_size(document.root.attrib)
-    assert size  # reading the shapes has checked it
+    size = known_size(document.root.attrib)
     excerpts = Excerpts(text, document)
     scope = f"{unused('kept', text)}0"
     definitions = excerpts.of(excerpts.needed([one.element for one in kept]), size)

@@ -25,7 +25,7 @@ from warpsplat.svg.geometry import (
 )
 from warpsplat.svg.gradients import FlatColor
 from warpsplat.svg.groups import LEVEL_ID
-from warpsplat.svg.inspect import inspect_svg, svg_size, view_box
+from warpsplat.svg.inspect import inspect_svg, known_size, view_box
 from warpsplat.svg.paths import Points
 from warpsplat.svg.shapes import CONTEXTS, Placement, Shape, element_shapes
 from warpsplat.svg.values import SvgViewport, fraction, parse_color
@@ -159,9 +159,7 @@ def read_parts(
 
 def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) -> tuple[Matrix, SvgViewport]:
     """Return the map of user units to canvas units, and the viewport."""
-    size = svg_size(root)
-    if size is None:
-        raise ImageError("has neither its size nor a viewBox")
+    size = known_size(root)
     if scale is None and abs(size[0] / size[1] - width / height) > 0.02 * width / height:
         raise ImageError(
             f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
