@@ -7,6 +7,8 @@ import gzip
 import io
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ from PIL import Image
 from tests.fuzz.corpus import saved
 from tests.scenes import random_scene
 from warpsplat.errors import OutputError, UsageError
+from warpsplat.files import output as files
 from warpsplat.files.marks import mark_dxf, mark_eps, mark_pdf, mark_png
 from warpsplat.files.output import SVG_ENDINGS, check_output, write_atomically
 from warpsplat.scene import Kind
@@ -153,12 +156,19 @@ def test_files_that_may_be_replaced(tmp_path: Path) -> None:
         assert marked.info["Software"] == "warpsplat"
 
 
-def test_only_old_temporary_files_are_removed(tmp_path: Path) -> None:
-    """Other runs may be writing the young ones."""
-    old, young, other = (f".warpsplat-{name}.tmp" for name in ("0" * 16, "1" * 16, "other"))
-    for name in (old, young, other):
+def test_only_temporary_files_of_dead_runs_are_removed(tmp_path: Path) -> None:
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    here = files._machine()
+    names = {
+        "dead": f".warpsplat-{here}-{dead.pid}-00000000.tmp",
+        "alive": f".warpsplat-{here}-{os.getppid()}-00000000.tmp",
+        "elsewhere": f".warpsplat-00000000-{dead.pid}-00000000.tmp",
+        "old": f".warpsplat-00000000-{dead.pid}-00000001.tmp",
+        "other": f".warpsplat-{here}-{dead.pid}.tmp",
+    }
+    for name in names.values():
         (tmp_path / name).touch()
-    for name in (old, other):
-        os.utime(tmp_path / name, (0, 0))
+    os.utime(tmp_path / names["old"], (0, 0))
     check_output(tmp_path / "a.svg")
-    assert sorted(os.listdir(tmp_path)) == sorted([young, other])
+    assert sorted(os.listdir(tmp_path)) == sorted(names[k] for k in ("alive", "elsewhere", "other"))

@@ -9,7 +9,9 @@ from __future__ import annotations
 import atexit
 import contextlib
 import gzip
+import hashlib
 import os
+import platform
 import re
 import stat
 import sys
@@ -73,7 +75,7 @@ def check_ending(path: Path, endings: tuple[str, ...]) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Remove files that killed runs left in ``folder``; raise ``UsageError`` if it cannot be written to."""
+    """Remove files that dead runs left in ``folder``; raise ``UsageError`` if it cannot be written to."""
     remove_stale(folder)
     try:
         handle, name = _temporary(folder)
@@ -202,12 +204,20 @@ def _keep_attributes(target: Path, handle: int) -> None:
             os.fchmod(handle, stat.S_IMODE(old.st_mode))  # last: a new owner clears bits
 
 
-TEMPORARY = re.compile(r"\.warpsplat-[0-9a-f]{16}\.tmp")
+def _machine() -> str:
+    """Return an identifier of the host and its process namespace, in which process ids are unique."""
+    space = ""
+    with contextlib.suppress(OSError):
+        space = os.readlink("/proc/self/ns/pid")
+    return hashlib.sha256(f"{platform.node()} {space}".encode()).hexdigest()[:8]
+
+
+TEMPORARY = re.compile(r"\.warpsplat-([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{8}\.tmp")
 
 
 def _temporary(folder: Path) -> tuple[int, str]:
     """Create a file in ``folder``, open for writing, with the default permissions of new files."""
-    name = os.path.join(folder, f".warpsplat-{os.urandom(8).hex()}.tmp")
+    name = os.path.join(folder, f".warpsplat-{_machine()}-{os.getpid()}-{os.urandom(4).hex()}.tmp")
     _unfinished.add(name)
     try:
         flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
@@ -232,11 +242,26 @@ def remove_unfinished() -> None:
 
 
 def remove_stale(folder: Path) -> None:
-    """Remove the temporary files that runs which were killed left in ``folder`` more than a day ago."""
+    """Remove the temporary files that dead runs left in ``folder``."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if TEMPORARY.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
-                age = time.time() - entry.stat(follow_symlinks=False).st_mtime
-                if age > 86_400:  # seconds: another process may be writing a younger one
-                    with contextlib.suppress(OSError):
-                        os.unlink(entry.path)
+            found = TEMPORARY.fullmatch(entry.name)
+            if not found or not entry.is_file(follow_symlinks=False):
+                continue
+            dead = found[1] == _machine() and _is_dead(int(found[2]))
+            age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+            if dead or age > 86_400:  # seconds, which is what a write takes
+                with contextlib.suppress(OSError):
+                    os.unlink(entry.path)
+
+
+def _is_dead(process: int) -> bool:
+    """Return whether a process of this machine has certainly ended."""
+    if os.name == "posix" and process > 0:
+        try:
+            os.kill(process, 0)
+        except ProcessLookupError:
+            return True
+        except (OSError, OverflowError):
+            pass
+    return False
