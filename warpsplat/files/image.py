@@ -262,9 +262,7 @@ def _strips(image: Image.Image) -> Iterator[tuple[slice, Image.Image]]:
         yield slice(top, bottom), image.crop((0, top, width, bottom))
 
 
-def to_srgb(
-    image: Image.Image, paper: float | FloatArray | None = 1.0, profile: Profile | None = None
-) -> FloatArray:
+def to_srgb(image: Image.Image, paper: float | FloatArray | None, profile: Profile | None) -> FloatArray:
     """Return a loaded Pillow image of any mode, or a part of one, as ``image_of``; ``profile``: its colours'.
 
     Raises:

@@ -64,7 +64,7 @@ class Profile:
         return bool((np.abs(found.astype(int) - np.atleast_3d(given)) <= same).all())
 
 
-def profile_of(image: Image.Image, name: str | None = "the image") -> Profile | None:
+def profile_of(image: Image.Image, name: str | None) -> Profile | None:
     """Return the profile of ``image``; None: it has none, or one that changes nothing.
 
     A profile that cannot be used is ignored, with a warning that begins with ``name`` if there is one.

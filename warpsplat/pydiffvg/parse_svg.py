@@ -61,7 +61,7 @@ def _read(text: str) -> Scene:
     units = box[2:] if box else size
     width, height = (max(1, int(side)) for side in units)  # whole units, as in DiffVG
     pairs: list[list[Drawn]] = []
-    for part in read_shapes(text, width, height, units[0] / size[0], see_through=True):
+    for part in read_shapes(text, units[0] / size[0], see_through=True):
         if part.is_twin and pairs[-1][-1].line is None:
             pairs[-1].append(part)
         else:

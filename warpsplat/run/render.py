@@ -115,7 +115,7 @@ def _draw_svg(
     width, height = (max(1, math.floor(math.floor(side + 0.5) * scale + 0.5)) for side in size)
     if width * height > MAX_PIXELS:
         raise ImageError(f"makes more than {MAX_PIXELS // 1_000_000} million pixels")
-    scene, has_background = scene_of(read_shapes(text, width, height, scale), width, height)
+    scene, has_background = scene_of(read_shapes(text, scale), width, height)
     if not has_background:
         scene = replace(scene, canvas=replace(scene.canvas, background=None))
     try:

@@ -146,7 +146,7 @@ def cubic_data(
     return f"{shortest(pen, segments)}z", start
 
 
-def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool = True) -> str:
+def spline_data(half: list[Pair], closed: bool, *, may_rotate: bool) -> str:
     """Return the path data of a spline: one quadratic, and smooth ones (SVG 1.1, 8.3.7).
 
     ``half``: its points, in half of the numbers that are written. ``may_rotate``: a ring may start where that

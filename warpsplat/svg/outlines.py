@@ -38,7 +38,7 @@ def drawn_on_page(text: str, units_per_inch: float, *, background: bool) -> Draw
         ImageError: Not an SVG, one of unknown size, or one with something other than fills and strokes.
     """
     width, height = known_size(inspect_svg(text).root)
-    shapes = read_shapes(text, 0, 0, 1.0, see_through=True, outlines=True)
+    shapes = read_shapes(text, 1.0, see_through=True, outlines=True)
     left, top, right, bottom = picture_area(text) or (0.0, 0.0, 1.0, 1.0)
     area = np.array([[left * width, top * height], [right * width, bottom * height]])
     if not background and len(shapes) > 1 and is_background(shapes[0], area):

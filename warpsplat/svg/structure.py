@@ -107,66 +107,61 @@ class _End:
     """Corners of the visible quadrilateral, shape (4, 2)."""
 
 
-def read_shapes(
-    text: str,
-    width: int,
-    height: int,
-    scale: float | None = None,
-    *,
-    see_through: bool = False,
-    outlines: bool = False,
-) -> list[Shape]:
-    """Return the shapes of an SVG drawn ``width`` x ``height`` px large, in painter's order.
+def read_shapes(text: str, scale: float, *, see_through: bool = False, outlines: bool = False) -> list[Shape]:
+    """Return the shapes of an SVG magnified by ``scale``, in painter's order.
 
-    ``scale``: the magnification; None: the SVG fills the picture, which has its proportions. ``see_through``:
-    fade overlapping shapes of a translucent group one by one, rather than refuse them. ``outlines``: accept
-    what changes the look of edges only: ``shape-rendering``, and strokes that a transform stretches, which
-    get their mean width.
+    ``see_through``: fade overlapping shapes of a translucent group one by one, rather than refuse them.
+    ``outlines``: accept what changes the look of edges only: ``shape-rendering``, and strokes that a
+    transform stretches, which get their mean width.
 
     Raises:
-        ImageError: Not an SVG, of other proportions, or with something that would be lost.
+        ImageError: Not an SVG, or one with something that would be lost.
     """
-    parts, _ = read_parts(text, width, height, scale, keep=False, see_through=see_through, outlines=outlines)
+    root = inspect_svg(text).root
+    parts, _ = _read(text, root, (scale, scale), see_through=see_through, outlines=outlines)
     return shapes_of(parts)
 
 
-def read_parts(
+def read_parts(text: str, width: int, height: int, *, keep: bool) -> tuple[list[Part], Document]:
+    """Return the shapes of an SVG that fills a picture of ``width`` x ``height`` px, and the document.
+
+    ``keep``: elements that ``read_shapes`` refuses are parts as well; only the root and style sheets may be
+    refused. It raises its errors, also for a picture of other proportions.
+    """
+    root = inspect_svg(text).root
+    across, down = known_size(root)
+    if abs(across / down - width / height) > 0.02 * width / height:
+        raise ImageError(
+            f"{across:g}x{down:g} does not have the proportions of the {width}x{height} image: "
+            "it has to show all of it, and nothing around it"
+        )
+    return _read(text, root, (width / across, height / down), keep=keep)
+
+
+def _read(
     text: str,
-    width: int,
-    height: int,
-    scale: float | None = None,
+    root: dict[str, str],
+    scale: tuple[float, float],
     *,
-    keep: bool,
+    keep: bool = False,
     see_through: bool = False,
     outlines: bool = False,
 ) -> tuple[list[Part], Document]:
-    """Return the shapes as ``read_shapes``, and the document.
-
-    ``keep``: elements that ``read_shapes`` refuses are parts as well; only the root and style sheets may be
-    refused.
-    """
-    root = inspect_svg(text).root
+    """Return the parts of an SVG, given the attributes of its ``root``, and the document."""
     try:
         with np.errstate(all="ignore"):  # points of shapes are checked for overflow
             document = Document(text)
             walk = _Walk(document, keep=keep, see_through=see_through, outlines=outlines)
-            return walk.parts_in(*_canvas(root, width, height, scale)), document
+            return walk.parts_in(*_canvas(root, scale)), document
     except (ImageError, MemoryError):
         raise
     except Exception as error:  # arithmetic on absurd numbers overflows in many ways
         raise ImageError(f"not an SVG that can be read: {cause_of(error)[:100]}") from error
 
 
-def _canvas(root: dict[str, str], width: int, height: int, scale: float | None) -> tuple[Matrix, SvgViewport]:
+def _canvas(root: dict[str, str], scale: tuple[float, float]) -> tuple[Matrix, SvgViewport]:
     """Return the map of user units to canvas units, and the viewport."""
-    size = known_size(root)
-    if scale is None and abs(size[0] / size[1] - width / height) > 0.02 * width / height:
-        raise ImageError(
-            f"{size[0]:g}x{size[1]:g} does not have the proportions of the {width}x{height} image: "
-            "it has to show all of it, and nothing around it"
-        )
-    sides = (width / size[0], height / size[1]) if scale is None else (scale, scale)
-    matrix = np.diag([*sides, 1.0])
+    size, matrix = known_size(root), np.diag([*scale, 1.0])
     view, box = view_box_map(root, *size), view_box(root)
     if view is None or box is None:
         return matrix, SvgViewport(*size)
