@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.svg.foreign import load_scene
+from tests.svg.foreign import HEAD, load_scene
 from warpsplat.errors import ImageError
 from warpsplat.svg.dxf import CURVES, TOLERANCE, draw_dxf
 from warpsplat.svg.page import on_sheet, sheet_for
@@ -16,7 +16,6 @@ from warpsplat.svg.write import write_svg
 
 pytest.importorskip("ezdxf")
 
-HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 PIXEL = 25.4 / 96
 
 DRAWING = f"""{HEAD}width="40mm" height="30mm" viewBox="0 0 400 300">

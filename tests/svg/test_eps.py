@@ -11,11 +11,10 @@ import pytest
 from PIL import Image
 
 from tests.cli.test_formats import SVG
+from tests.svg.foreign import HEAD
 from warpsplat.metrics import psnr
 from warpsplat.svg.eps import draw_eps
 from warpsplat.svg.viewer import on_white, render_svg
-
-HEAD = '<svg xmlns="http://www.w3.org/2000/svg" '
 
 
 def lines_of(shapes: str) -> list[str]:

@@ -267,6 +267,10 @@ class Scene:
         """Return which shapes share their points with the next one, shape (shape,)."""
         return np.append(self.twin[1:], 0)[: len(self)] == 1
 
+    def are_alone(self) -> Bools:
+        """Return which shapes share their points with no other, shape (shape,)."""
+        return (self.twin == 0) & ~self.has_twin()
+
     def first_contours(self) -> IndexArray:
         """Return the first contour of each shape and, last, the number of contours, shape (shape + 1,)."""
         return np.searchsorted(self.starts, self.first)

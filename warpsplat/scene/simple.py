@@ -51,8 +51,8 @@ def simple(scene: Scene, per_pixel: float) -> Scene:
 
 def free_fills(scene: Scene) -> list[int]:
     """Return the fills of cubics or splines that are not stroked as well."""
-    free = (scene.kind == Kind.FILL) & (scene.twin == 0) & ~scene.has_twin()
-    return np.flatnonzero(free & (scene.basis <= Basis.SPLINE)).tolist()
+    free = (scene.kind == Kind.FILL) & (scene.basis <= Basis.SPLINE) & scene.are_alone()
+    return np.flatnonzero(free).tolist()
 
 
 def rings_of(scene: Scene, shape: int, per_pixel: float) -> list[Floats]:

@@ -25,7 +25,7 @@ def in_parts(scene: Scene, most: int = MOST_NODES) -> Scene:
     cubic = scene.basis[scene.contour_shapes()] == Basis.CUBIC
     nodes: IndexArray = np.where(cubic, -(-points // 3), points).astype(np.intp)
     total = np.add.reduceat(np.append(nodes, 0), contours[:-1]) if len(scene) else nodes
-    large = (total > most) & (np.diff(contours) > 1) & (scene.twin == 0) & ~scene.has_twin()
+    large = (total > most) & (np.diff(contours) > 1) & scene.are_alone()
     if not large.any():
         return scene
     parts: list[list[IndexArray]] = [[np.arange(low, high)] for low, high in itertools.pairwise(contours)]

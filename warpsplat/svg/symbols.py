@@ -21,7 +21,7 @@ def parts_of(scene: Scene) -> list[IndexArray]:
     Holes run anticlockwise. Fills that are stroked as well are left out.
     """
     is_plain = (scene.kind == Kind.FILL) & (scene.paint == Paint.FLAT) & (scene.basis == Basis.CUBIC)
-    is_plain &= (scene.twin == 0) & ~scene.has_twin()
+    is_plain &= scene.are_alone()
     bounds = scene.first_contours()
     found = []
     for shape in np.flatnonzero(is_plain).tolist():

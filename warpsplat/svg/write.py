@@ -163,7 +163,7 @@ def _basic_shapes(scene: Scene, per_pixel: float) -> dict[int, str]:
     if scene.canvas.crisp:
         return {}
     size = np.array([scene.canvas.width, scene.canvas.height]) * per_pixel
-    alone = (np.diff(scene.first_contours()) == 1) & (scene.twin == 0) & ~scene.has_twin()
+    alone = (np.diff(scene.first_contours()) == 1) & scene.are_alone()
     owner, found = scene.contour_shapes().tolist(), {}
     exact = scene.points.astype(np.float64) * units(scene, per_pixel)
     for contour, made in primitives(scene, exact, whole=True):
