@@ -78,10 +78,11 @@ def with_parts(scene: Scene, parts: list[list[IndexArray]]) -> Scene:
 
 def _with_contours(shapes: Scene, scene: Scene, contours: IndexArray, counts: IndexArray) -> Scene:
     """Return ``shapes`` with contours of ``scene``, of which each shape has so many."""
-    starts = starts_of(np.diff(scene.starts)[contours])
+    points = np.diff(scene.starts)[contours]
+    starts = starts_of(points)
     return replace(
         shapes,
-        points=scene.points[rows_of(scene, contours)],
+        points=scene.points[ranges(scene.starts[contours], points)],
         starts=starts,
         closed=scene.closed[contours],
         first=starts[starts_of(counts)],
@@ -89,5 +90,6 @@ def _with_contours(shapes: Scene, scene: Scene, contours: IndexArray, counts: In
 
 
 def rows_of(scene: Scene, contours: IndexArray) -> IndexArray:
-    """Return the rows of the points of some contours."""
-    return ranges(scene.starts[contours], scene.starts[contours + 1] - scene.starts[contours])
+    """Return the rows of the points of a few contours, for which this is faster than ``ranges``."""
+    starts = scene.starts
+    return np.concatenate([np.arange(starts[c], starts[c + 1]) for c in contours.tolist()])

@@ -89,7 +89,7 @@ def with_symbols(scene: Scene, per_pixel: float) -> tuple[Scene, str, dict[int, 
 def _data_of(scene: Scene, part: IndexArray, origin: Floats, per_pixel: float) -> str:
     """Return the path data of a part with its first point at 0."""
     shape = int(scene.contour_shapes()[part[0]])
-    own = part - scene.first_contours()[shape]
+    own = part - np.searchsorted(scene.starts, scene.first[shape])
     alone = with_parts(scene.take(np.array([shape])), [[own]])
     moved = replace(alone, points=(alone.points - origin).astype(np.float32))
     return next(path_data(moved, per_pixel))
