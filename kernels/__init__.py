@@ -43,6 +43,5 @@ Data flow of a step (forward, then its adjoint in reverse order)::
     points         --outline-->  vertices    --bins-->  slots by tile  --coverage/fill, stroke-->  coverage
     vertices       --stroker, corners-->  polygons of styled strokes, covered as fills are
     points, widths --grid-->     Gaussians   --bins-->  slots by tile  --coverage/splat-->         coverage
-    shapes         --grid/soft--> Gaussians  --bins-->  slots by tile  --coverage/gaussian-->      coverage
     coverage, paint --composite--> image --loss--> image_grad      gradients --adam--> new parameters
 """

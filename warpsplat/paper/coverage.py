@@ -10,15 +10,13 @@ from warpsplat.rendering.coverage import CoverageBuffers
 from warpsplat.rendering.program import Program
 
 
-class SplatCoverage:
-    """The paper's Gaussians: 1 - product of 1 - g."""
+class GaussianCoverage:
+    """The paper's Gaussians: 1 - product of 1 - g, of soft ones 1 - product of 1 - o g."""
 
     mapping = constants.PRODUCT
-    is_soft = False
-    """Whether opacities are inside the product."""
 
     def __init__(self, inputs: StageInputs, grid: Grid) -> None:
-        self._inputs, self._grid = inputs, grid
+        self._inputs, self._grid, self._is_soft = inputs, grid, grid.softness is not None
         self.buffers = inputs.backend.allocate(CoverageBuffers, {"slots": inputs.slots})
         self._sources = (self.buffers, inputs.bins.buffers, grid.buffers)
 
@@ -26,7 +24,7 @@ class SplatCoverage:
         """See ``Coverage``."""
         backend = self._inputs.backend
         program.launch(
-            splat_coverage.make_forward(backend.column, soft=self.is_soft),
+            splat_coverage.make_forward(backend.column, soft=self._is_soft),
             (self._inputs.slots, backend.lanes),
             *self._sources,
             lanes=backend.lanes,
@@ -39,16 +37,10 @@ class SplatCoverage:
     def backward(self, program: Program) -> None:
         """See ``Coverage``: from the Gaussians on to the shapes' attributes."""
         program.launch(
-            splat_coverage.make_backward(self._inputs.backend.column, soft=self.is_soft),
+            splat_coverage.make_backward(self._inputs.backend.column, soft=self._is_soft),
             self._grid.buffers.mean.shape[0],
             *self._sources,
             sum_grad=self.buffers.coverage,
             split=True,
         )
         self._grid.backward(program)
-
-
-class GaussianCoverage(SplatCoverage):
-    """1 - product of 1 - o g."""
-
-    is_soft = True

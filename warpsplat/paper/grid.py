@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import warp as wp
 
 from warpsplat.paper.chains import check_chains
-from warpsplat.paper.kernels import fill, gaussians, stroke
+from warpsplat.paper.kernels import fill, gaussians, plan, soft, stroke
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.ranges import record_ranges
-from warpsplat.scene import Kind
+from warpsplat.scene import GRADIENTS, Kind
 
 
 @dataclass
@@ -51,52 +52,68 @@ class GridBuffers:
     position_grad: wp.array = buffer(wp.vec2, "gaussians")
     station_grad: wp.array = buffer(wp.vec2, "gaussians")
     station_width_grad: wp.array = buffer(wp.float32, "gaussians")
-    strength: wp.array = buffer(wp.float32, 0)
-    """Opacity of each Gaussian; ``SoftBuffers`` alone has any."""
-    strength_grad: wp.array = buffer(wp.float32, 0)
+    strength: wp.array = buffer(wp.float32, "soft")
+    """Opacity of each Gaussian; soft ones alone have any."""
+    strength_grad: wp.array = buffer(wp.float32, "soft")
+    gaussian_width_grad: wp.array = buffer(wp.float32, "soft")
 
 
-@dataclass(frozen=True)
-class GridKernels:
+class Softness(NamedTuple):
+    """Options of soft Gaussians."""
+
+    sigma: float
+    """Standard deviation that every Gaussian has at least [canvas units]; a pixel's area adds to it."""
+    density: float
+    """Gaussians along and across a shape over their usual number."""
+
+
+class GridKernels(NamedTuple):
     """Kernels that put one kind of shape on a grid, and their adjoints."""
 
-    plan: wp.Kernel
     forward: wp.Kernel
-    stations_backward: wp.Kernel
+    stations_backward: wp.Kernel | None
     points_backward: wp.Kernel
 
 
-GRIDS = {
-    Kind.FILL: GridKernels(
-        fill.plan_fill, fill.fill_grid_forward, fill.fill_stations_backward, fill.fill_points_backward
-    ),
-    Kind.STROKE: GridKernels(
-        stroke.plan_stroke,
-        stroke.stroke_grid_forward,
-        stroke.stroke_stations_backward,
-        stroke.stroke_points_backward,
-    ),
-}
+FILLS = GridKernels(fill.fill_grid_forward, fill.fill_stations_backward, fill.fill_points_backward)
+STROKES = GridKernels(
+    stroke.stroke_grid_forward, stroke.stroke_stations_backward, stroke.stroke_points_backward
+)
+ROWS = GridKernels(soft.soft_stroke_forward, None, soft.soft_stroke_backward)
+"""Those of soft strokes, one row of Gaussians each."""
 
 
 class Grid:
-    """Puts a grid of Gaussians along and across each shape."""
+    """Puts a grid of Gaussians along and across each shape; soft ones in a row along each stroke."""
 
-    owned: type[GridBuffers] = GridBuffers
-    """Class of its buffers."""
-
-    def __init__(self, inputs: StageInputs, *, through_scales: bool, fold: float) -> None:
+    def __init__(
+        self, inputs: StageInputs, *, through_scales: bool, fold: float, softness: Softness | None = None
+    ) -> None:
         """Allocate.
 
         Raises:
-            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
+            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2); or a
+                shape of soft ones a gradient, whose opacities would count besides the Gaussians'.
         """
-        self._parameters, self._viewport = inputs.parameters, inputs.viewport
-        self._through_scales, self._fold = through_scales, fold
+        p = self._parameters = inputs.parameters
         self._capacity, self._needed = inputs.samples, inputs.needed
-        check_chains(inputs.parameters.structure)
-        sizes = {"shapes": inputs.parameters.shape_count, "gaussians": inputs.samples}
-        self.buffers = inputs.backend.allocate(self.owned, sizes)
+        self.softness = softness
+        if softness and p.paints & set(GRADIENTS):
+            raise ValueError("soft Gaussians have flat colours, no gradients")
+        check_chains(p.structure)
+        sizes = {
+            "shapes": p.shape_count,
+            "gaussians": inputs.samples,
+            "soft": inputs.samples if softness else 0,
+        }
+        self.buffers = inputs.backend.allocate(GridBuffers, sizes)
+        self._sources = (self.buffers, p.arrays, inputs.viewport)
+        self._scales = {
+            "through_scales": float(through_scales),
+            "fold_factor": fold / inputs.viewport.pixel_count,
+        }
+        kernels = {Kind.FILL: FILLS, Kind.STROKE: ROWS if softness else STROKES}
+        self._kernels = [kernels[kind] for kind in sorted(p.kinds)]
 
     def samples(self) -> dict[str, wp.array]:
         """Return the parameters of ``bins.rectangles``."""
@@ -108,38 +125,38 @@ class Grid:
             "extent": b.extent,
         }
 
-    @property
-    def _sources(self) -> tuple[object, ...]:
-        return self.buffers, self._parameters.arrays, self._viewport
-
-    def _number(self, program: Program) -> None:
-        """Record counts of Gaussians -> where those of each shape are."""
-        b = self.buffers
-        ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_first, b.gaussian_last)
-        record_ranges(program, *ranges, self._needed, capacity=self._capacity)
+    def _launch(self, program: Program, kernel: wp.Kernel, dim: int, **values: float) -> None:
+        program.launch(kernel, dim, *self._sources, split=True, **values)
 
     def forward(self, program: Program) -> None:
-        """Record points, widths -> Gaussians."""
-        b, p = self.buffers, self._parameters
-        for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].plan, p.shape_count, *self._sources, split=True)
-        self._number(program)
-        for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].forward, self._capacity, *self._sources, split=True)
-        program.launch(gaussians.gaussians_forward, self._capacity, b, split=True)
+        """Record points, widths -> Gaussians; soft ones have opacities of their own."""
+        b, shapes = self.buffers, self._parameters.shape_count
+        if self.softness:
+            size = {"soft": 1, "density": self.softness.density, "scale": 1.0}
+        else:
+            size = {"soft": 0, "density": 1.0}
+        self._launch(program, plan.plan_grid, shapes, **size)
+        ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_first, b.gaussian_last)
+        record_ranges(program, *ranges, self._needed, capacity=self._capacity)
+        for kernels in self._kernels:
+            self._launch(program, kernels.forward, self._capacity)
+        if self.softness:
+            kernel, sigma = soft.soft_gaussians_forward, self.softness.sigma
+            self._launch(program, kernel, self._capacity, softness=sigma)
+        else:
+            self._launch(program, gaussians.gaussians_forward, self._capacity)
 
     def backward(self, program: Program) -> None:
-        """Record gradients of means and conics -> gradients of points and widths."""
-        b, p = self.buffers, self._parameters
-        program.launch(
-            gaussians.differences_backward,
-            self._capacity,
-            b,
-            through_scales=float(self._through_scales),
-            fold_factor=self._fold / self._viewport.pixel_count,
-            split=True,
-        )
-        program.launch(gaussians.positions_backward, self._capacity, b, split=True)
-        for kind in sorted(p.kinds):
-            program.launch(GRIDS[kind].stations_backward, self._capacity, *self._sources, split=True)
-            program.launch(GRIDS[kind].points_backward, p.point_count, *self._sources, split=True)
+        """Record gradients of means, conics and strengths -> gradients of the shapes' attributes."""
+        if self.softness:
+            kernel, sigma = soft.soft_differences_backward, self.softness.sigma
+            self._launch(program, kernel, self._capacity, softness=sigma, **self._scales)
+        else:
+            self._launch(program, gaussians.differences_backward, self._capacity, **self._scales)
+        self._launch(program, gaussians.positions_backward, self._capacity)
+        for kernels in self._kernels:
+            if kernels.stations_backward:
+                self._launch(program, kernels.stations_backward, self._capacity)
+            self._launch(program, kernels.points_backward, self._parameters.point_count)
+        if self.softness:
+            self._launch(program, soft.soft_shapes_backward, self._parameters.shape_count)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from warpsplat.paper.coverage import GaussianCoverage, SplatCoverage
-from warpsplat.paper.grid import Grid
-from warpsplat.paper.soft import SoftGrid
+import warp as wp
+
+from warpsplat.paper.coverage import GaussianCoverage
+from warpsplat.paper.grid import Grid, Softness
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.coverage import Coverage
 from warpsplat.rendering.models import Geometry
 
 
 @dataclass(frozen=True, kw_only=True)
-class GridModel:
-    """Options of both models, grids of Gaussians along and across each shape."""
+class SplatModel:
+    """The paper's Gaussians, on grids along and across shapes, so placed that they cover what paths cover."""
 
     through_scales: bool = True
     """Whether gradients flow through the Gaussians' scales and angles."""
@@ -22,42 +23,35 @@ class GridModel:
     """Weight of the fold loss (fills; the folded fraction of the canvas), which the adjoint adds."""
     samples_per_shape: int = 64
 
-
-@dataclass(frozen=True)
-class SplatModel(GridModel):
-    """The paper's Gaussians, so placed that they cover what the path covers."""
-
     def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
         """See ``Model``.
 
         Raises:
-            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
+            ValueError: as ``Grid``.
         """
-        grid = Grid(inputs, through_scales=self.through_scales, fold=self.fold)
-        return grid, SplatCoverage(inputs, grid)
+        grid = Grid(inputs, through_scales=self.through_scales, fold=self.fold, softness=self._softness())
+        return grid, GaussianCoverage(inputs, grid)
+
+    def _softness(self) -> Softness | None:
+        return None
 
 
 @dataclass(frozen=True)
-class GaussianModel(GridModel):
+class GaussianModel(SplatModel):
     """The paper's own soft model: an opacity for each Gaussian, one soft row for a stroke."""
 
     softness: float = 0.6
-    """Standard deviation that every Gaussian has at least [canvas units]; a pixel's area adds to it."""
+    """See ``Softness.sigma``."""
     density: float = 0.5
-    """Gaussians along and across a shape over their usual number."""
+    """See ``Softness.density``."""
 
     def stages(self, inputs: StageInputs) -> tuple[Geometry, Coverage]:
-        """See ``Model``.
+        """See ``Model``; the shapes' opacities are in their coverages, and 1 where they are composited."""
+        made = super().stages(inputs)
+        ones = inputs.backend.array(wp.float32, inputs.parameters.shape_count)
+        ones.fill_(1.0)
+        inputs.bins.paint["opacities"] = ones
+        return made
 
-        Raises:
-            ValueError: a fill has an odd number of cubics, and so no two chains (paper section 3.2).
-        """
-        grid = SoftGrid(
-            inputs,
-            softness=self.softness,
-            density=self.density,
-            through_scales=self.through_scales,
-            fold=self.fold,
-        )
-        inputs.bins.paint["opacities"] = grid.buffers.paint_opacities
-        return grid, GaussianCoverage(inputs, grid)
+    def _softness(self) -> Softness:
+        return Softness(self.softness, self.density)

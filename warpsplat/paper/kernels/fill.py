@@ -9,15 +9,15 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
 from warpsplat.paper import constants as paper
-from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
+from warpsplat.paper.kernels.strips import Place, make_grid_forward
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 
 @wp.func
 def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
-    """Return the index of control point ``i`` of a chain in the outline's ring: chain 0 runs forwards from
-    point 0, chain 1 backwards; both end in the middle of the ring.
+    """Return the index of control point ``i`` of a chain in the outline's ring, and the reverse: chain 0 runs
+    forwards from point 0, chain 1 backwards; both end in the middle of the ring.
     """
     if chain == 0:
         return i
@@ -28,17 +28,6 @@ def ring_index(chain: wp.int32, i: wp.int32, point_count: wp.int32) -> wp.int32:
 def segment_at(t: wp.float32, segment_count: wp.int32) -> wp.int32:
     """Return the segment that holds parameter ``t`` in [0, segment_count] of a chain."""
     return wp.clamp(int(wp.floor(t)), 0, segment_count - 1)
-
-
-@wp.func
-def local_weight(weights: wp.vec4, segment: wp.int32, i: wp.int32) -> wp.float32:
-    """Return the weight of chain control point ``i`` where the chain is in ``segment``; 0 outside its
-    support.
-    """
-    j = i - 3 * segment
-    if j < 0 or j > 3:
-        return 0.0
-    return weights[j]
 
 
 @wp.func
@@ -83,39 +72,6 @@ def measure_strip(points: wp.array[wp.vec2], start: wp.int32, cubics: wp.int32, 
         a0 = a1
         b0 = b1
     return wp.vec3(wp.max(length_a, length_b), width / float(count), doubled_area)
-
-
-@wp.kernel
-def plan_fill(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    scale: wp.float32,  # render pixels per canvas unit
-    # Out:
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] 1: all stations are neighbours
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_reach: wp.array[wp.float32],  # [shape_count]
-    gaussian_count: wp.array[wp.int32],  # [shape_count] stations x rows
-    shape_sign: wp.array[wp.float32],  # [shape_count] 1 or -1, the orientation of the outline
-):
-    """Grid size from the longer chain and the mean width of the strip. One thread a shape."""
-    shape = offset + wp.tid()
-    if kind[shape] != constants.FILL:
-        return
-    start = point_first[shape]
-    cubics = chain_cubics(point_first, shape)
-    strip = measure_strip(points, start, cubics, scale)
-    rows = row_plan(strip[1])
-    stations = station_plan(strip[0])
-    shape_stations[shape] = stations
-    shape_runs[shape] = 1
-    shape_rows[shape] = int(rows[0])
-    shape_reach[shape] = rows[1]
-    gaussian_count[shape] = bounded_product(stations, int(rows[0]))
-    shape_sign[shape] = wp.sign(strip[2])
 
 
 @wp.func
@@ -193,14 +149,12 @@ def fill_points_backward(
     if gaussian_last[shape] > gaussian_first[shape]:
         stations = shape_stations[shape]
         for chain in range(2):
-            index = point
-            if chain == 1:
-                index = (point_count - point) % point_count
+            index = ring_index(chain, point, point_count)
             if index <= 3 * cubics:
                 for station in range(stations):
                     t = (float(station) + 0.5) * float(cubics) / float(stations)
                     segment = segment_at(t, cubics)
                     if index >= 3 * segment and index <= 3 * segment + 3:
-                        weight = local_weight(cubic_weights(t - float(segment)), segment, index)
+                        weight = cubic_weights(t - float(segment))[index - 3 * segment]
                         total += weight * station_grad[gaussian_first[shape] + chain * stations + station]
     points_grad[i] = total

@@ -19,63 +19,16 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
 from warpsplat.paper import constants as paper
-from warpsplat.paper.kernels.fill import chain_cubics, measure_strip
 from warpsplat.paper.kernels.gaussians import (
     conic_adjoint,
     conic_and_extent,
     difference_grads,
     differences_at,
 )
-from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
-from warpsplat.paper.kernels.stroke import longest_segment, weighted_point
+from warpsplat.paper.kernels.strips import Place, make_grid_forward
+from warpsplat.paper.kernels.stroke import weighted_point
 
 wp.set_module_options(constants.MODULE_OPTIONS)
-
-
-@wp.func
-def soft_stations(length: wp.float32, density: wp.float32) -> wp.int32:
-    """Stations along a curve ``length`` [canvas units] long."""
-    return wp.max(3, int(wp.ceil(density * float(station_plan(length)))))
-
-
-@wp.kernel
-def plan_soft(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    density: wp.float32,  # Gaussians along and across over their usual number
-    # Out:
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] 1: all stations are neighbours
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_reach: wp.array[wp.float32],  # [shape_count]
-    gaussian_count: wp.array[wp.int32],  # [shape_count] stations x rows
-    shape_sign: wp.array[wp.float32],  # [shape_count] orientation of a fill's outline, 0 for strokes
-):
-    """Grid size of a fill from its longer chain and mean width, of a stroke from its longest cubic: each of
-    its cubics has as many stations. One thread a shape.
-    """
-    shape = offset + wp.tid()
-    start = point_first[shape]
-    shape_runs[shape] = 1
-    if kind[shape] == constants.STROKE:
-        segments = (point_first[shape + 1] - start) / 3
-        longest = longest_segment(points, start, segments, 1.0)
-        shape_stations[shape] = bounded_product(segments, soft_stations(longest, density))
-        shape_rows[shape] = 1
-        shape_reach[shape] = 0.0
-        shape_sign[shape] = 0.0
-    else:
-        cubics = chain_cubics(point_first, shape)
-        strip = measure_strip(points, start, cubics, 1.0)
-        rows = row_plan(strip[1])
-        shape_stations[shape] = soft_stations(strip[0], density)
-        shape_rows[shape] = wp.max(2, int(wp.ceil(density * rows[0])))
-        shape_reach[shape] = rows[1]
-        shape_sign[shape] = wp.sign(strip[2])
-    gaussian_count[shape] = bounded_product(shape_stations[shape], shape_rows[shape])
 
 
 @wp.func

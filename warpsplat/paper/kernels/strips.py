@@ -68,8 +68,8 @@ def normal_quantile(tail: wp.float32) -> wp.float32:
 
 
 @wp.func
-def row_plan(width: wp.float32) -> wp.vec2:
-    """(row count, reach) for a strip ``width`` [px] wide."""
+def row_plan(width: wp.float32, density: wp.float32) -> wp.vec2:
+    """(row count, reach) for a strip ``width`` [px] wide; ``density``: rows over their usual number."""
     # The outermost row at a quarter of the strip at the most: two rows are the least. And so far inside a
     # strip of millions of pixels that a float can tell.
     edge = wp.clamp(paper.ROW_INSET / wp.max(width, constants.EPSILON), EDGE_MIN, 0.25)
@@ -77,7 +77,8 @@ def row_plan(width: wp.float32) -> wp.vec2:
     # Near the boundary du = phi(z) dz and u = Phi(z), so the relative step is the hazard rate of the
     # normal distribution times dz; z + 1 / (z + 1) is close to it over the range in use.
     step = paper.ROW_GROWTH / (reach + 1.0 / (reach + 1.0))
-    return wp.vec2(wp.max(2.0, wp.ceil(2.0 * reach / step) + 1.0), reach)
+    rows = density * wp.max(2.0, wp.ceil(2.0 * reach / step) + 1.0)
+    return wp.vec2(wp.max(2.0, wp.ceil(rows)), reach)
 
 
 @wp.func
@@ -91,10 +92,11 @@ def row_position(row: wp.int32, rows: wp.int32, reach: wp.float32) -> wp.float32
 
 
 @wp.func
-def station_plan(length: wp.float32) -> wp.int32:
-    """Stations along a curve ``length`` [px] long."""
+def station_plan(length: wp.float32, density: wp.float32) -> wp.int32:
+    """Stations along a curve ``length`` [px] long; ``density``: stations over their usual number."""
     count = wp.max(length / paper.STATION_SPACING, paper.STATION_DENSITY * wp.sqrt(length))
-    return wp.max(paper.STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
+    usual = wp.max(paper.STATIONS_MIN, int(wp.ceil(wp.min(count, 1.0e6))))
+    return wp.max(3, int(wp.ceil(density * float(usual))))
 
 
 @wp.struct

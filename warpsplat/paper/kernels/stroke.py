@@ -11,7 +11,7 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cubic_weights
 from warpsplat.kernels.elementary import sine_and_cosine
 from warpsplat.paper import constants as paper
-from warpsplat.paper.kernels.strips import Place, bounded_product, make_grid_forward, row_plan, station_plan
+from warpsplat.paper.kernels.strips import Place, make_grid_forward
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -49,38 +49,6 @@ def longest_segment(
             before = here
         longest = wp.max(longest, length)
     return longest
-
-
-@wp.kernel
-def plan_stroke(
-    # In:
-    offset: wp.int32,
-    points: wp.array[wp.vec2],  # [point_count] canvas units
-    widths: wp.array[wp.float32],  # [shape_count] canvas units
-    kind: wp.array[wp.int32],  # [shape_count]
-    point_first: wp.array[wp.int32],  # [shape_count + 1]
-    scale: wp.float32,  # render pixels per canvas unit
-    # Out:
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] one a segment
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_reach: wp.array[wp.float32],  # [shape_count]
-    gaussian_count: wp.array[wp.int32],  # [shape_count] stations x rows
-):
-    """Grid size from the stroke's width and its longest segment; the stations include the caps."""
-    shape = offset + wp.tid()
-    if kind[shape] != constants.STROKE:
-        return
-    start = point_first[shape]
-    segments = (point_first[shape + 1] - start) / 3
-    longest = longest_segment(points, start, segments, scale)
-    rows = row_plan(scale * widths[shape])
-    stations = bounded_product(segments, station_plan(longest) + 2 * cap_plan(int(rows[0])))
-    shape_stations[shape] = stations
-    shape_runs[shape] = segments
-    shape_rows[shape] = int(rows[0])
-    shape_reach[shape] = rows[1]
-    gaussian_count[shape] = bounded_product(stations, int(rows[0]))
 
 
 @wp.func
