@@ -301,26 +301,6 @@ def any_visible(slot_state: wp.array[wp.int32], first: wp.int32, last: wp.int32)
 
 
 @wp.func
-def sum_columns(
-    coverage: wp.array2d[tile_column],
-    slot_state: wp.array[wp.int32],
-    slot_winding: wp.array[wp.int32],
-    first: wp.int32,
-    last: wp.int32,
-):
-    """Compute prefix sums along the rows of the slots [first, last), clamped: 16 rows at a time."""
-    total = tile_column(0.0)
-    one = tile_column(1.0)
-    for s in range(first, last):
-        if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
-            for x in range(constants.TILE):
-                total = total + coverage[s, x]
-                coverage[s, x] = wp.min(wp.max(total, -one), one)
-        else:
-            total = float(slot_winding[s]) * one
-
-
-@wp.func
 def fold(s: wp.float32) -> wp.float32:
     """Return a winding-weighted area's signed distance from the nearest even number: by the even-odd rule,
     its magnitude is the coverage and its sign that of the coverage's derivative.
@@ -333,26 +313,29 @@ def fold(s: wp.float32) -> wp.float32:
 
 
 @wp.func
-def fold_columns(
+def sum_columns(
     coverage: wp.array2d[tile_column],
     slot_state: wp.array[wp.int32],
     slot_winding: wp.array[wp.int32],
     first: wp.int32,
     last: wp.int32,
+    rule: wp.int32,
 ):
-    """Compute prefix sums along the rows of the slots [first, last), folded: 16 rows at a time."""
+    """Compute prefix sums along the rows of the slots [first, last), clamped or folded: 16 rows at a time."""
     total = tile_column(0.0)
+    one = tile_column(1.0)
     for s in range(first, last):
         if slot_state[s] & constants.PARTIAL == constants.PARTIAL:
             columns = int(constants.TILE)  # not unrolled: as fast, and sooner compiled
             for x in range(columns):
                 total = total + coverage[s, x]
-                value = tile_column(0.0)
-                for y in range(constants.TILE):
-                    value[y] = fold(total[y])
+                value = wp.min(wp.max(total, -one), one)
+                if rule == constants.EVENODD:
+                    for y in range(constants.TILE):
+                        value[y] = fold(total[y])
                 coverage[s, x] = value
         else:
-            total = float(slot_winding[s]) * tile_column(1.0)
+            total = float(slot_winding[s]) * one
 
 
 @wp.func
@@ -493,10 +476,8 @@ def make_forward(column: Any) -> wp.Kernel:
             if first_slot > slot:
                 winding = slot_winding[first_slot - 1]
             sum_row(coverage_pixels, first_slot, end, lane, rule[shape], winding)
-        elif rule[shape] == constants.NONZERO:
-            sum_columns(coverage, slot_state, slot_winding, slot, end)
         else:
-            fold_columns(coverage, slot_state, slot_winding, slot, end)
+            sum_columns(coverage, slot_state, slot_winding, slot, end, rule[shape])
         keep_slopes(coverage_pixels, slot_state, first_slot, end, row_first - top, lane_rows)
 
     return fill_forward

@@ -113,15 +113,7 @@ def gradient_backward(
     slot_last: wp.array[wp.int32],  # [shape_count]
     slot_tile: wp.array[wp.int32],  # [slot_capacity]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
-    paint: wp.array[wp.int32],  # [shape_count]
-    spread: wp.array[wp.int32],  # [shape_count]
-    frames: wp.array[frame],  # [shape_count]
-    focus: wp.array[wp.vec3],  # [shape_count]
-    stop_first: wp.array[wp.int32],  # [shape_count + 1]
-    stop_offsets: wp.array[wp.float32],  # [stop_count]
-    stop_colors: wp.array[wp.vec3],  # [stop_count]
-    stop_opacities: wp.array[wp.float32],  # [stop_count]
-    g: Gradients,  # the same, for ``case_of``
+    g: Gradients,
     paint_pixels: wp.array3d[wp.float32],  # [paint_slots, 4, TILE_PIXELS] gradients of colour and opacity
     # Out:
     frames_grad: wp.array[frame],  # [shape_count] written
@@ -133,17 +125,17 @@ def gradient_backward(
     a constant. One thread a shape.
     """
     shape = offset + wp.tid()
-    if not is_gradient(paint[shape]):
+    if not is_gradient(g.paint[shape]):
         return
-    first = stop_first[shape]
-    last = stop_first[shape + 1]
     if case_of(g, shape) != GENERAL:
         return
+    first = g.stop_first[shape]
+    last = g.stop_first[shape + 1]
     for i in range(first, last):
         stop_offsets_grad[i] = 0.0
         stop_colors_grad[i] = wp.vec3(0.0, 0.0, 0.0)
         stop_opacities_grad[i] = 0.0
-    f = frames[shape]
+    f = g.frames[shape]
     origin = wp.vec2(0.0, 0.0)
     along = wp.vec2(0.0, 0.0)
     across = wp.vec2(0.0, 0.0)
@@ -156,17 +148,17 @@ def gradient_backward(
                 place = to_unit(
                     f, pixel_place(slot_tile[slot], tiles_x, p / constants.TILE, p % constants.TILE, scale)
                 )
-                raw = parameter(paint[shape], focus[shape], place)
-                t = spread_out(spread[shape], raw[0])
-                at = between_stops(stop_offsets, first, last, t[0])
+                raw = parameter(g.paint[shape], g.focus[shape], place)
+                t = spread_out(g.spread[shape], raw[0])
+                at = between_stops(g.stop_offsets, first, last, t[0])
                 low_share = 1.0 - at.share
                 stop_colors_grad[at.low] = stop_colors_grad[at.low] + low_share * color
                 stop_colors_grad[at.high] = stop_colors_grad[at.high] + at.share * color
                 stop_opacities_grad[at.low] = stop_opacities_grad[at.low] + low_share * opacity
                 stop_opacities_grad[at.high] = stop_opacities_grad[at.high] + at.share * opacity
                 if at.width > 0.0:
-                    step = wp.dot(color, stop_colors[at.high] - stop_colors[at.low])
-                    step += opacity * (stop_opacities[at.high] - stop_opacities[at.low])
+                    step = wp.dot(color, g.stop_colors[at.high] - g.stop_colors[at.low])
+                    step += opacity * (g.stop_opacities[at.high] - g.stop_opacities[at.low])
                     by_t = step / at.width
                     if at.low_is_own == 1:
                         stop_offsets_grad[at.low] = stop_offsets_grad[at.low] - low_share * by_t
