@@ -6,9 +6,7 @@ inlined there. Gradients and pictures fill arrays that compositing reads, and re
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -63,7 +61,6 @@ class Painting:
                 "paint_slots": 1 if self.is_flat else slots,
             },
         )
-        self._gradients = _gradients_in(parameters.arrays) if self.has_gradients else {}
         self._sources = (self.buffers, inputs.bins.buffers, parameters.arrays, inputs.viewport)
 
     def forward(self, program: Program) -> None:
@@ -84,7 +81,6 @@ class Painting:
                 (self._slots, self._backend.lanes),
                 *self._sources,
                 self._pictures or {},
-                self._gradients,
                 lane_columns=self._backend.lane_columns,
                 split=True,
             )
@@ -98,19 +94,9 @@ class Painting:
 
             for case in NAMES:
                 kernel = make_backward(column, case)
-                program.launch(kernel, shapes, *self._sources, self._gradients, split=True)
+                program.launch(kernel, shapes, *self._sources, split=True)
         if self._backend.lanes == 1:
             program.launch(flat.flat_backward, shapes, *self._sources, split=True)
         else:
             program.launch(flat.sum_slots, (shapes, self._backend.lanes), *self._sources, split=True)
             program.launch(flat.sum_lanes, shapes, *self._sources, split=True)
-
-
-def _gradients_in(arrays: Mapping[str, wp.array]) -> dict[str, Any]:
-    """Return the paints of shapes as the kernels of gradients take them."""
-    from warpsplat.kernels.paint.gradient import Gradients
-
-    paints = Gradients()
-    for name in Gradients.vars:  # type: ignore[attr-defined]  # of Warp's struct
-        setattr(paints, name, arrays[name])
-    return {"g": paints}

@@ -9,11 +9,12 @@ import functools
 import itertools
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
+from warp._src.codegen import Struct
 
 from warpsplat.errors import cause_of
 from warpsplat.native import messages_hidden
@@ -139,7 +140,7 @@ class Program:
 
     def memory(self) -> dict[int, int]:
         """Return the bytes of the arrays of all launches, by address."""
-        arrays = (array for arguments in self._arrays for array in arguments if isinstance(array, wp.array))
+        arrays = (array for arguments in self._arrays for array in _arrays(arguments))
         return {array.ptr: array.capacity for array in arrays if array.ptr}
 
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
@@ -289,22 +290,40 @@ def _layout(fields: tuple[tuple[str, Any], ...]) -> type[ctypes.Structure]:
 
 
 def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]) -> list[Any]:
-    """Return the arguments of ``kernel`` but the first, found by name; see ``Program.launch``.
+    """Return the arguments of ``kernel`` but the first, found by name, structs by their fields; see
+    ``Program.launch``.
 
     Raises:
         TypeError: a parameter is missing or stands in two sources, or a value is no parameter.
     """
-    names = [argument.label for argument in kernel.adj.args[1:]]
-    unknown = values.keys() - set(names)
-    if unknown:
+    used: set[str] = set()
+
+    def found(name: str, kind: Any) -> Any:
+        if isinstance(kind, Struct):
+            made = kind()
+            for field, variable in kind.vars.items():
+                setattr(made, field, found(field, variable.type))
+            return made
+        used.add(name)
+        fitting = [values[name]] if name in values else _lookup(name, sources)
+        if len(fitting) != 1:
+            problem = "missing" if not fitting else "ambiguous"
+            raise TypeError(f"{kernel.key}: parameter {name} is {problem}")
+        return fitting[0]
+
+    arguments = [found(argument.label, argument.type) for argument in kernel.adj.args[1:]]
+    if unknown := values.keys() - used:
         raise TypeError(f"{kernel.key} has no parameter {', '.join(sorted(unknown))}")
-    arguments = []
-    for name in names:
-        found = [values[name]] if name in values else _lookup(name, sources)
-        if len(found) != 1:
-            raise TypeError(f"{kernel.key}: parameter {name} is {'missing' if not found else 'ambiguous'}")
-        arguments.append(found[0])
     return arguments
+
+
+def _arrays(values: Iterable[Any]) -> Iterator[wp.array]:
+    """Yield the arrays among arguments, those in structs too."""
+    for value in values:
+        if isinstance(value, wp.array):
+            yield value
+        elif hasattr(value, "__ctype__"):
+            yield from _arrays(vars(value).values())
 
 
 def _lookup(name: str, sources: Sequence[object]) -> list[Any]:
