@@ -19,9 +19,8 @@ def grid_of(renderer: Renderer) -> GridBuffers:
 
 
 def plans_of(renderer: Renderer) -> list[Plan]:
-    b = grid_of(renderer)
-    arrays = (b.shape_stations.numpy(), b.shape_rows.numpy(), b.shape_reach.numpy())
-    return [Plan(int(c), int(r), float(z)) for c, r, z in zip(*arrays, strict=True)]
+    grids = grid_of(renderer).shape_grid.numpy()
+    return [Plan(int(each["stations"]), int(each["rows"]), float(each["reach"])) for each in grids]
 
 
 def soft_image(

@@ -101,7 +101,7 @@ def test_gradient(device: str) -> None:
     weight = 3.0
     renderer = renderer_for(scene, device, model=SplatModel(fold=weight))
     p = tensors(scene)
-    signs = grid_of(renderer).shape_sign.numpy()
+    signs = grid_of(renderer).shape_grid.numpy()["sign"]
     assert not signs[scene.kind == Kind.STROKE].any()
     areas = [
         fold_area(grid, float(sign))
@@ -120,7 +120,7 @@ def test_orientation_does_not_matter_and_a_disc_has_no_fold(device: str) -> None
     mirrored = replace(scene, points=np.ascontiguousarray(scene.points[..., ::-1]))
     for s, sign in ((scene, 1.0), (mirrored, -1.0)):
         renderer = renderer_for(s, device, model=SplatModel(fold=1.0))
-        assert grid_of(renderer).shape_sign.numpy()[0] == sign
+        assert grid_of(renderer).shape_grid.numpy()["sign"][0] == sign
         renderer.backward()
         assert not renderer.parameters.gradients()["points"].any()
 

@@ -9,6 +9,7 @@ import warp as wp
 
 from warpsplat.paper.chains import check_chains
 from warpsplat.paper.kernels import fill, gaussians, plan, soft, stroke
+from warpsplat.paper.kernels.strips import ShapeGrid
 from warpsplat.rendering.backend import buffer
 from warpsplat.rendering.bins import StageInputs
 from warpsplat.rendering.program import Program
@@ -20,15 +21,8 @@ from warpsplat.scene import GRADIENTS, Kind
 class GridBuffers:
     """Buffers of the stage."""
 
-    shape_stations: wp.array = buffer(wp.int32, "shapes")
-    """Gaussians along each shape."""
-    shape_runs: wp.array = buffer(wp.int32, "shapes")
-    """Stretches of stations without neighbours in one another."""
-    shape_rows: wp.array = buffer(wp.int32, "shapes")
-    """Gaussians across each shape."""
-    shape_reach: wp.array = buffer(wp.float32, "shapes")
-    shape_sign: wp.array = buffer(wp.float32, "shapes")
-    """Orientation of a fill's outline."""
+    shape_grid: wp.array = buffer(ShapeGrid, "shapes")
+    """How many Gaussians each shape has along and across."""
     gaussian_count: wp.array = buffer(wp.int32, "shapes")
     gaussian_ends: wp.array = buffer(wp.int32, "shapes")
     gaussian_first: wp.array = buffer(wp.int32, "shapes")

@@ -9,7 +9,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross, cubic_weights
 from warpsplat.paper import constants as paper
-from warpsplat.paper.kernels.strips import Place, make_grid_forward
+from warpsplat.paper.kernels.strips import Place, ShapeGrid, make_grid_forward
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -75,10 +75,10 @@ def measure_strip(points: wp.array[wp.vec2], start: wp.int32, cubics: wp.int32, 
 
 
 @wp.func
-def fill_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
+def fill_position(points: wp.array[wp.vec2], p: Place, grid: ShapeGrid) -> wp.vec2:
     """X(r, k) = (1 - u_r) B0(t_k) + u_r B1(t_k) (paper eq. 4 and 5), t_k at the middle of its cell."""
     cubics = p.count / 6
-    t = (float(p.station) + 0.5) * float(cubics) / float(p.stations)
+    t = (float(p.station) + 0.5) * float(cubics) / float(grid.stations)
     a = chain_point(points, p.start, 0, t, cubics)
     b = chain_point(points, p.start, 1, t, cubics)
     return (1.0 - p.u) * a + p.u * b
@@ -93,11 +93,10 @@ def fill_stations_backward(
     offset: wp.int32,
     kind: wp.array[wp.int32],  # [shape_count]
     scale: wp.float32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
-    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
+    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity] of the grid positions
     # Out:
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity] rows 0 and 1 of a shape: of the chains' points
@@ -109,12 +108,12 @@ def fill_stations_backward(
         return
     if kind[shape] != constants.FILL:
         return
-    stations = shape_stations[shape]
+    stations = shape_grid[shape].stations
     if i - gaussian_first[shape] >= stations:
         return
     a_grad = wp.vec2(0.0, 0.0)
     b_grad = wp.vec2(0.0, 0.0)
-    for row in range(shape_rows[shape]):
+    for row in range(shape_grid[shape].rows):
         j = i + row * stations
         u = gaussian_across[j]
         a_grad += (1.0 - u) * position_grad[j]
@@ -132,7 +131,7 @@ def fill_points_backward(
     point_shape: wp.array[wp.int32],  # [point_count]
     gaussian_first: wp.array[wp.int32],  # [shape_count]
     gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] written
@@ -146,8 +145,9 @@ def fill_points_backward(
     point_count = 6 * cubics
     point = i - point_first[shape]
     total = wp.vec2(0.0, 0.0)
-    if gaussian_last[shape] > gaussian_first[shape]:
-        stations = shape_stations[shape]
+    start = gaussian_first[shape]
+    if gaussian_last[shape] > start:
+        stations = shape_grid[shape].stations
         for chain in range(2):
             index = ring_index(chain, point, point_count)
             if index <= 3 * cubics:
@@ -156,5 +156,5 @@ def fill_points_backward(
                     segment = segment_at(t, cubics)
                     if index >= 3 * segment and index <= 3 * segment + 3:
                         weight = cubic_weights(t - float(segment))[index - 3 * segment]
-                        total += weight * station_grad[gaussian_first[shape] + chain * stations + station]
+                        total += weight * station_grad[start + chain * stations + station]
     points_grad[i] = total

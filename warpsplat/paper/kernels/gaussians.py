@@ -18,6 +18,7 @@ import warp as wp
 from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cross
 from warpsplat.paper import constants as paper
+from warpsplat.paper.kernels.strips import ShapeGrid
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -46,14 +47,14 @@ def difference(
 
 
 @wp.func
-def straightness(
-    values: wp.array[wp.vec2], i: wp.int32, stride: wp.int32, index: wp.int32, count: wp.int32
-) -> wp.float32:
-    """Squared cosine of the turn at entry ``i``, 0 for right angles and more, 1 at an end."""
+def straightness(values: wp.array[wp.vec2], i: wp.int32, index: wp.int32, count: wp.int32) -> wp.float32:
+    """Squared cosine of the turn at entry ``i``, number ``index`` of ``count``, 0 for right angles and more,
+    1 at an end.
+    """
     if index == 0 or index == count - 1:
         return 1.0
-    before = values[i] - values[i - stride]
-    after = values[i + stride] - values[i]
+    before = values[i] - values[i - 1]
+    after = values[i + 1] - values[i]
     lengths = wp.length(before) * wp.length(after)
     if lengths < constants.EPSILON * constants.EPSILON:
         return 1.0
@@ -62,14 +63,13 @@ def straightness(
 
 
 @wp.func
-def differences_at(
-    mean: wp.array[wp.vec2], i: wp.int32, index: wp.int32, stations: wp.int32, run: wp.int32, rows: wp.int32
-):
+def differences_at(mean: wp.array[wp.vec2], i: wp.int32, index: wp.int32, grid: ShapeGrid):
     """Return Dx, Dr and the straightness at Gaussian ``i``, number ``index`` of its shape."""
-    station = (index % stations) % run
+    run = grid.stations / grid.runs
+    station = (index % grid.stations) % run
     dx = difference(mean, i, 1, station, run)
-    dr = difference(mean, i, stations, index / stations, rows)
-    return dx, dr, straightness(mean, i, 1, station, run)
+    dr = difference(mean, i, grid.stations, index / grid.stations, grid.rows)
+    return dx, dr, straightness(mean, i, station, run)
 
 
 @wp.func
@@ -138,9 +138,7 @@ def gaussians_forward(
     offset: wp.int32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] stretches of stations without neighbours in one another
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
     conic: wp.array[wp.vec3],  # [gaussian_capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
@@ -152,11 +150,9 @@ def gaussians_forward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    stations = shape_stations[shape]
+    grid = shape_grid[shape]
     index = i - gaussian_first[shape]
-    dx, dr, straight = differences_at(
-        mean, i, index, stations, stations / shape_runs[shape], shape_rows[shape]
-    )
+    dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
     across = wp.length(dr)
@@ -164,7 +160,7 @@ def gaussians_forward(
         e = dx / length
         across = cross(e, dr)
     q_cut = float(paper.Q_INNER)
-    if index < stations or index / stations == shape_rows[shape] - 1:
+    if index < grid.stations or index / grid.stations == grid.rows - 1:
         q_cut = paper.Q_MAX
     cut[i] = q_cut
     inverse, box = conic_and_extent(e, variance(straight * length), variance(across), q_cut)
@@ -176,15 +172,12 @@ def gaussians_forward(
 def differences_backward(
     # In:
     offset: wp.int32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] stretches of stations without neighbours in one another
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] (of a, b, c)
     through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
-    shape_sign: wp.array[wp.float32],  # [shape_count] orientation of the outline; 0: may fold
     fold_factor: wp.float32,  # weight of the folded area [per px squared]
     # Out:
     along_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dx
@@ -208,11 +201,8 @@ def differences_backward(
         return
     along_grad[i] = wp.vec2(0.0, 0.0)
     across_grad[i] = wp.vec2(0.0, 0.0)
-    stations = shape_stations[shape]
-    index = i - gaussian_first[shape]
-    dx, dr, straight = differences_at(
-        mean, i, index, stations, stations / shape_runs[shape], shape_rows[shape]
-    )
+    grid = shape_grid[shape]
+    dx, dr, straight = differences_at(mean, i, i - gaussian_first[shape], grid)
     length = wp.length(dx)
     if length < constants.EPSILON:
         return
@@ -224,7 +214,7 @@ def differences_backward(
     g = conic_adjoint(e, through_scales * conic_grad[i])
     length_grad = -2.0 * paper.SPREAD * paper.SPREAD * straight * reach * ix * ix * g[0]
     h_grad = -2.0 * paper.SPREAD * paper.SPREAD * h * iy * iy * g[1]
-    fold = fold_factor * shape_sign[shape]
+    fold = fold_factor * grid.sign
     along, across = difference_grads(dx, dr, length_grad, h_grad, (ix - iy) * g[2], fold)
     along_grad[i] = along
     across_grad[i] = across
@@ -234,11 +224,9 @@ def differences_backward(
 def positions_backward(
     # In:
     offset: wp.int32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count] stretches of stations without neighbours in one another
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     along_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dx
     across_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dr
@@ -250,15 +238,13 @@ def positions_backward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    stations = shape_stations[shape]
-    rows = shape_rows[shape]
-    station = (i - gaussian_first[shape]) % stations
-    row = (i - gaussian_first[shape]) / stations
+    grid = shape_grid[shape]
+    run = grid.stations / grid.runs
+    station = (i - gaussian_first[shape]) % grid.stations % run
+    row = (i - gaussian_first[shape]) / grid.stations
     total = mean_grad[i]
-    run = stations / shape_runs[shape]
-    station = station % run
     for k in range(wp.max(station - 1, 0), wp.min(station + 2, run)):
         total += difference_weight(k, station, run) * along_grad[i + k - station]
-    for r in range(wp.max(row - 1, 0), wp.min(row + 2, rows)):
-        total += difference_weight(r, row, rows) * across_grad[i + (r - row) * stations]
+    for r in range(wp.max(row - 1, 0), wp.min(row + 2, grid.rows)):
+        total += difference_weight(r, row, grid.rows) * across_grad[i + (r - row) * grid.stations]
     position_grad[i] = total

@@ -25,16 +25,16 @@ from warpsplat.paper.kernels.gaussians import (
     difference_grads,
     differences_at,
 )
-from warpsplat.paper.kernels.strips import Place, make_grid_forward
+from warpsplat.paper.kernels.strips import Place, ShapeGrid, make_grid_forward
 from warpsplat.paper.kernels.stroke import weighted_point
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
 
 @wp.func
-def soft_stroke_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
+def soft_stroke_position(points: wp.array[wp.vec2], p: Place, grid: ShapeGrid) -> wp.vec2:
     """X(k) = B(t_k) (paper eq. 3), t_k at the middle of its cell."""
-    each = p.stations / (p.count / 3)
+    each = grid.stations / (p.count / 3)
     weights = cubic_weights((float(p.station % each) + 0.5) / float(each))
     return weighted_point(points, p.start + 3 * (p.station / each), weights)
 
@@ -59,8 +59,7 @@ def soft_gaussians_forward(
     softness: wp.float32,  # canvas units
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
     conic: wp.array[wp.vec3],  # [gaussian_capacity] (a, b, c) of q = a dx^2 + 2 b dx dy + c dy^2, px^-2
@@ -73,9 +72,9 @@ def soft_gaussians_forward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    stations = shape_stations[shape]
+    grid = shape_grid[shape]
     index = i - gaussian_first[shape]
-    dx, dr, straight = differences_at(mean, i, index, stations, stations, shape_rows[shape])
+    dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     reach = paper.SPREAD * straight * length
     e = wp.vec2(1.0, 0.0)
@@ -90,7 +89,7 @@ def soft_gaussians_forward(
     conic[i] = inverse
     cut[i] = paper.Q_SOFT
     extent[i] = box
-    opacity = opacities[shape] + fades[shape][third(index % stations, stations)]
+    opacity = opacities[shape] + fades[shape][third(index % grid.stations, grid.stations)]
     strength[i] = paper.GAUSSIAN_MAX * wp.clamp(opacity, 0.0, 1.0)
 
 
@@ -101,14 +100,12 @@ def soft_differences_backward(
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
     softness: wp.float32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] (of a, b, c)
     through_scales: wp.float32,  # 1: gradients flow through scales and angles; 0: detached, as the reference
-    shape_sign: wp.array[wp.float32],  # [shape_count] orientation of the outline; 0: may fold
     fold_factor: wp.float32,  # weight of the folded area [per px squared]
     # Out:
     along_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dx
@@ -122,9 +119,9 @@ def soft_differences_backward(
     shape = gaussian_shape[i]
     if shape < 0:
         return
-    stations = shape_stations[shape]
+    grid = shape_grid[shape]
     index = i - gaussian_first[shape]
-    dx, dr, straight = differences_at(mean, i, index, stations, stations, shape_rows[shape])
+    dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
     if length >= constants.EPSILON:
@@ -143,7 +140,7 @@ def soft_differences_backward(
     if length >= constants.EPSILON:
         length_grad = -2.0 * paper.SPREAD * straight * reach * ix * ix * (through_scales * g[0])
         h_grad = 2.0 * paper.SPREAD * paper.SPREAD * h * (through_scales * variance_grad)
-        fold = fold_factor * shape_sign[shape]
+        fold = fold_factor * grid.sign
         angle_grad = (ix - iy) * (through_scales * g[2])
         along, across = difference_grads(dx, dr, length_grad, h_grad, angle_grad, fold)
     along_grad[i] = along
@@ -160,7 +157,7 @@ def soft_stroke_backward(
     scale: wp.float32,
     gaussian_first: wp.array[wp.int32],  # [shape_count]
     gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     # Out:
     points_grad: wp.array[wp.vec2],  # [point_count] written
@@ -175,8 +172,9 @@ def soft_stroke_backward(
     segments = (point_first[shape + 1] - point_first[shape]) / 3
     total = wp.vec2(0.0, 0.0)
     if gaussian_last[shape] > start:
-        each = shape_stations[shape] / segments
-        for station in range(shape_stations[shape]):
+        stations = shape_grid[shape].stations
+        each = stations / segments
+        for station in range(stations):
             j = point - 3 * (station / each)
             if j >= 0 and j <= 3:
                 weights = cubic_weights((float(station % each) + 0.5) / float(each))
@@ -192,7 +190,7 @@ def soft_shapes_backward(
     fades: wp.array[wp.vec3],  # [shape_count]
     gaussian_first: wp.array[wp.int32],  # [shape_count]
     gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     strength_grad: wp.array[wp.float32],  # [gaussian_capacity]
     gaussian_width_grad: wp.array[wp.float32],  # [gaussian_capacity]
     # Out:
@@ -204,7 +202,7 @@ def soft_shapes_backward(
     gradient that leads back counts.
     """
     shape = offset + wp.tid()
-    stations = shape_stations[shape]
+    stations = shape_grid[shape].stations
     width = float(0.0)
     sums = wp.vec3(0.0, 0.0, 0.0)
     for i in range(gaussian_first[shape], gaussian_last[shape]):

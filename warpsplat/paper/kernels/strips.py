@@ -100,6 +100,17 @@ def station_plan(length: wp.float32, density: wp.float32) -> wp.int32:
 
 
 @wp.struct
+class ShapeGrid:
+    """How many Gaussians a shape has, and where their rows lie."""
+
+    stations: wp.int32  # along the shape
+    runs: wp.int32  # stretches of stations without neighbours in one another; 1: all are neighbours
+    rows: wp.int32  # across the shape
+    reach: wp.float32  # of the outermost rows, see the module
+    sign: wp.float32  # 1 or -1: orientation of a fill's outline; 0 for strokes, which may fold
+
+
+@wp.struct
 class Place:
     """Place of a Gaussian in the grid of its shape."""
 
@@ -107,16 +118,13 @@ class Place:
     count: wp.int32  # of control points
     width: wp.float32  # canvas units
     scale: wp.float32
-    stations: wp.int32
-    runs: wp.int32
-    rows: wp.int32
     station: wp.int32
     u: wp.float32  # of its row
 
 
 def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Kernel:
     """Return the kernel that puts the Gaussians of shapes of ``own_kind`` at ``position``, a function of the
-    control points and a ``Place`` [canvas units].
+    control points, a ``Place`` and a ``ShapeGrid`` [canvas units].
     """
 
     @wp.kernel(name=name, module="unique", module_options=constants.MODULE_OPTIONS)
@@ -131,10 +139,7 @@ def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Ker
         gaussian_ends: wp.array[wp.int32],  # [shape_count]
         gaussian_first: wp.array[wp.int32],  # [shape_count]
         gaussian_last: wp.array[wp.int32],  # [shape_count]
-        shape_stations: wp.array[wp.int32],  # [shape_count]
-        shape_runs: wp.array[wp.int32],  # [shape_count]
-        shape_rows: wp.array[wp.int32],  # [shape_count]
-        shape_reach: wp.array[wp.float32],  # [shape_count]
+        shape_grid: wp.array[ShapeGrid],  # [shape_count]
         # Out:
         gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
         gaussian_across: wp.array[wp.float32],  # [gaussian_capacity] u of the row
@@ -151,18 +156,17 @@ def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Ker
         gaussian_shape[i] = -1
         if i >= gaussian_last[shape]:
             return
+        grid = shape_grid[shape]
+        index = i - gaussian_first[shape]
         place = Place()
         place.start = point_first[shape]
         place.count = point_first[shape + 1] - point_first[shape]
         place.width = widths[shape]
         place.scale = scale
-        place.stations = shape_stations[shape]
-        place.runs = shape_runs[shape]
-        place.rows = shape_rows[shape]
-        place.station = (i - gaussian_first[shape]) % place.stations
-        place.u = row_position((i - gaussian_first[shape]) / place.stations, place.rows, shape_reach[shape])
+        place.station = index % grid.stations
+        place.u = row_position(index / grid.stations, grid.rows, grid.reach)
         gaussian_shape[i] = shape
         gaussian_across[i] = place.u
-        mean[i] = scale * position(points, place)
+        mean[i] = scale * position(points, place, grid)
 
     return forward

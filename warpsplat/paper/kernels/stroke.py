@@ -11,7 +11,7 @@ from warpsplat.kernels import constants
 from warpsplat.kernels.bezier import cubic_weights
 from warpsplat.kernels.elementary import sine_and_cosine
 from warpsplat.paper import constants as paper
-from warpsplat.paper.kernels.strips import Place, make_grid_forward
+from warpsplat.paper.kernels.strips import Place, ShapeGrid, make_grid_forward
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -90,12 +90,12 @@ def weighted_point(points: wp.array[wp.vec2], point: wp.int32, weights: wp.vec4)
 
 
 @wp.func
-def stroke_position(points: wp.array[wp.vec2], p: Place) -> wp.vec2:
+def stroke_position(points: wp.array[wp.vec2], p: Place, grid: ShapeGrid) -> wp.vec2:
     """X(r, k) = B(t_k) + width / 2 (along_k e_k + across_k (2 u_r - 1) n_k), e the unit tangent, n = e
     turned by a right angle. A tangent of length 0 (coinciding control points) counts as (1, 0).
     """
-    run = p.stations / p.runs
-    place = run_place(p.station % run, run, p.rows, p.scale * p.width)
+    run = grid.stations / grid.runs
+    place = run_place(p.station % run, run, grid.rows, p.scale * p.width)
     point = p.start + 3 * (p.station / run)
     e = unit_tangent(weighted_point(points, point, cubic_tangent_weights(place[0])))
     away = place[1] * e + place[2] * (2.0 * p.u - 1.0) * wp.vec2(-e[1], e[0])
@@ -114,12 +114,10 @@ def stroke_stations_backward(
     kind: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     scale: wp.float32,
-    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity]
-    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
+    gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
     gaussian_first: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
+    gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     # Out:
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity] row 0: of B(t_k), row 1: of B'(t_k)
@@ -134,21 +132,20 @@ def stroke_stations_backward(
         return
     if kind[shape] != constants.STROKE:
         return
-    stations = shape_stations[shape]
-    rows = shape_rows[shape]
+    grid = shape_grid[shape]
     station = i - gaussian_first[shape]
-    if station >= stations:
+    if station >= grid.stations:
         return
-    run = stations / shape_runs[shape]
-    place = run_place(station % run, run, rows, scale * widths[shape])
+    run = grid.stations / grid.runs
+    place = run_place(station % run, run, grid.rows, scale * widths[shape])
     point = point_first[shape] + 3 * (station / run)
     tangent = weighted_point(points, point, cubic_tangent_weights(place[0]))
     e = unit_tangent(tangent)
     centre_grad = wp.vec2(0.0, 0.0)
     e_grad = wp.vec2(0.0, 0.0)
     width_grad = float(0.0)
-    for row in range(rows):
-        j = i + row * stations
+    for row in range(grid.rows):
+        j = i + row * grid.stations
         g = scale * position_grad[j]
         v = place[2] * (2.0 * gaussian_across[j] - 1.0)
         centre_grad += g
@@ -160,7 +157,7 @@ def stroke_stations_backward(
     if length >= constants.EPSILON:
         tangent_grad = (e_grad - wp.dot(e, e_grad) * e) / length
     station_grad[i] = centre_grad
-    station_grad[i + stations] = tangent_grad
+    station_grad[i + grid.stations] = tangent_grad
     station_width_grad[i] = 0.5 * width_grad
 
 
@@ -175,9 +172,7 @@ def stroke_points_backward(
     scale: wp.float32,
     gaussian_first: wp.array[wp.int32],  # [shape_count]
     gaussian_last: wp.array[wp.int32],  # [shape_count]
-    shape_stations: wp.array[wp.int32],  # [shape_count]
-    shape_runs: wp.array[wp.int32],  # [shape_count]
-    shape_rows: wp.array[wp.int32],  # [shape_count]
+    shape_grid: wp.array[ShapeGrid],  # [shape_count]
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     station_width_grad: wp.array[wp.float32],  # [gaussian_capacity]
     # Out:
@@ -194,14 +189,14 @@ def stroke_points_backward(
     total = wp.vec2(0.0, 0.0)
     width_total = float(0.0)
     if gaussian_last[shape] > start:
-        stations = shape_stations[shape]
-        run = stations / shape_runs[shape]
-        for station in range(stations):
+        grid = shape_grid[shape]
+        run = grid.stations / grid.runs
+        for station in range(grid.stations):
             j = point - 3 * (station / run)
             if j >= 0 and j <= 3:
-                place = run_place(station % run, run, shape_rows[shape], scale * widths[shape])
+                place = run_place(station % run, run, grid.rows, scale * widths[shape])
                 total += cubic_weights(place[0])[j] * station_grad[start + station]
-                total += cubic_tangent_weights(place[0])[j] * station_grad[start + stations + station]
+                total += cubic_tangent_weights(place[0])[j] * station_grad[start + grid.stations + station]
             if point == 0:
                 width_total += station_width_grad[start + station]
     points_grad[i] = total
