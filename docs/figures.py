@@ -70,7 +70,7 @@ class Stages:
         """Polyline of a shape [px], shape (vertex, 2)."""
         assert isinstance(self.renderer.geometry, Outline)
         b = self.renderer.geometry.buffers
-        first, last = (int(array.numpy()[shape]) for array in (b.vertex_first, b.vertex_last))
+        first, last = b.vertex_range.numpy()[shape].tolist()
         return np.asarray(b.vertex.numpy()[first:last])
 
     def slot(self, shape: int, tile: int) -> int:

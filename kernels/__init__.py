@@ -12,12 +12,13 @@ Conventions and glossary, here once:
   to ``point_first[i + 1]``, its **Béziers** those from ``bezier_first[i]`` on; ``point_shape`` is the shape
   of each point.
 * A **sample** is a point from which a shape's tiles are found: a **vertex** of its polyline (exact coverage),
-  or a **Gaussian** (splats). A shape's samples are the range [``*_first``, ``*_last``), empty where they did
-  not fit into the capacity.
+  or a **Gaussian** (splats). A shape's samples, corners and slots are its ``*_range``: the first, and one
+  past the last; empty where they did not fit into the capacity.
 * A **corner** is a vertex of the polygons that a styled stroke is drawn as; they lie one after the other as
   the vertices do. The **part** of a shape says which kernels cover it: its kind, or STYLED.
 * Gaussians lie on a grid of **rows** across a shape and **stations** along it, number
-  ``gaussian_first + row * stations + station``. Stations fall into **runs**: neighbours only inside a run.
+  ``gaussian_range[shape][0] + row * stations + station``. Stations fall into **runs**: neighbours only inside
+  a run.
 * The **strength** of a soft Gaussian is its opacity inside the product over its shape's Gaussians; the
   **fades** of a stroke are what its thirds add to its opacity.
 * A **slot** is one (shape, tile) pair. The slots of a shape are the tiles of its bounding rectangle, row by

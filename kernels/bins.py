@@ -17,8 +17,7 @@ wp.set_module_options(constants.MODULE_OPTIONS)
 def rectangles(
     # In:
     offset: wp.int32,
-    sample_first: wp.array[wp.int32],  # [shape_count] vertices or Gaussians
-    sample_last: wp.array[wp.int32],  # [shape_count]
+    sample_range: wp.array[wp.vec2i],  # [shape_count] of vertices or Gaussians
     position: wp.array[wp.vec2],  # [sample_capacity] px
     extent: wp.array[wp.vec2],  # [sample_capacity] px
     tiles_x: wp.int32,
@@ -31,7 +30,8 @@ def rectangles(
     shape = offset + wp.tid()
     low = wp.vec2(1.0e9, 1.0e9)
     high = wp.vec2(-1.0e9, -1.0e9)
-    for i in range(sample_first[shape], sample_last[shape]):
+    samples = sample_range[shape]
+    for i in range(samples[0], samples[1]):
         low = wp.min(low, position[i] - extent[i])
         high = wp.max(high, position[i] + extent[i])
     x0 = int(0)
@@ -61,8 +61,7 @@ def fill_slots(
     # In:
     offset: wp.int32,
     front_ends: wp.array[wp.int32],  # [shape_count] inclusive prefix sum of front_slots
-    slot_first: wp.array[wp.int32],  # [shape_count] by shape
-    slot_last: wp.array[wp.int32],  # [shape_count] by shape
+    slot_range: wp.array[wp.vec2i],  # [shape_count] by shape
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     tiles_x: wp.int32,
     # Out:
@@ -80,10 +79,11 @@ def fill_slots(
     tile = int(constants.INT_MAX)
     if front < shape_count:
         candidate = shape_count - 1 - front
-        if slot >= slot_first[candidate] and slot < slot_last[candidate]:
+        slots = slot_range[candidate]
+        if slot >= slots[0] and slot < slots[1]:
             shape = candidate
             width = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-            local = slot - slot_first[shape]
+            local = slot - slots[0]
             tile = (shape_tiles[shape, 1] + local / width) * tiles_x + shape_tiles[shape, 0] + local % width
     slot_shape[slot] = shape
     slot_tile[slot] = tile

@@ -65,7 +65,7 @@ def place_corners(
     scale: wp.float32,
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px; of the centre lines
     vertex_next: wp.array[wp.int32],  # [vertex_capacity]
-    corner_last: wp.array[wp.int32],  # [shape_count]
+    corner_range: wp.array[wp.vec2i],  # [shape_count]
     corner_ends: wp.array[wp.int32],  # [shape_count] inclusive prefix sum of their numbers
     corner_segments: wp.array[wp.vec2i],  # [vertex_capacity] what it hangs on, and the second or the same
     corner_place: wp.array[wp.vec4],  # [vertex_capacity] along, share, angle, radius
@@ -79,7 +79,7 @@ def place_corners(
     shape = find_range(corner_ends, shapes, i)
     if shape >= shapes:
         return
-    if i >= corner_last[shape]:
+    if i >= corner_range[shape][1]:
         return
     before = corner_segments[i][0]
     after = corner_segments[i][1]
@@ -192,12 +192,10 @@ def corners_backward(
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
     contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
     bezier_vertex: wp.array[wp.int32],  # [bezier_count]
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px; of the centre lines
     vertex_next: wp.array[wp.int32],  # [vertex_capacity]
-    corner_first: wp.array[wp.int32],  # [shape_count]
-    corner_last: wp.array[wp.int32],  # [shape_count]
+    corner_range: wp.array[wp.vec2i],  # [shape_count]
     corner_next: wp.array[wp.int32],  # [vertex_capacity]
     corner: wp.array[wp.vec2],  # [vertex_capacity] px
     corner_segments: wp.array[wp.vec2i],  # [vertex_capacity]
@@ -214,12 +212,14 @@ def corners_backward(
     shape = offset + wp.tid()
     if part[shape] != constants.STYLED:
         return
-    for i in range(vertex_first[shape], vertex_last[shape]):
+    vertices = vertex_range[shape]
+    for i in range(vertices[0], vertices[1]):
         start_grad[i] = wp.vec2(0.0, 0.0)
         end_grad[i] = wp.vec2(0.0, 0.0)
         segment_grad[i] = wp.vec3(0.0, 0.0, 0.0)
     outwards = float(0.0)
-    for i in range(corner_first[shape], corner_last[shape]):
+    corners = corner_range[shape]
+    for i in range(corners[0], corners[1]):
         at = int(i)
         g = corner_start_grad[i]
         for _ in range(2):
@@ -238,11 +238,11 @@ def corners_backward(
             at = corner_next[i]
             g = corner_end_grad[i]
     widths_grad[shape] = 0.5 * scale * outwards / wp.max(half_width(widths[shape], scale), TINY)
-    if vertex_last[shape] > vertex_first[shape]:
-        last = vertex_last[shape]
+    if vertices[1] > vertices[0]:
+        last = vertices[1]
         bezier = bezier_first[shape + 1]
         while bezier > bezier_first[shape]:
             bezier = contour_bezier[bezier_contour[bezier - 1]]
-            first = vertex_first[shape] + bezier_vertex[bezier]
+            first = vertices[0] + bezier_vertex[bezier]
             add_segment_grads(first, last, vertex, vertex_next, segment_grad, start_grad, end_grad)
             last = first

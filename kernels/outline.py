@@ -124,8 +124,7 @@ def outline_forward(
     contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
     contour_closed: wp.array[wp.int32],  # [contour_count]
     scale: wp.float32,
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     bezier_vertex: wp.array[wp.int32],  # [bezier_count]
     bezier_pieces: wp.array[wp.int32],  # [bezier_count]
     # Out:
@@ -140,13 +139,14 @@ def outline_forward(
     bezier = offset + wp.tid()
     contour = bezier_contour[bezier]
     shape = contour_shape[contour]
-    if vertex_last[shape] == vertex_first[shape]:
+    vertices = vertex_range[shape]
+    if vertices[1] == vertices[0]:
         return
     closed = contour_closed[contour] != 0
     local = bezier - contour_bezier[contour]
     is_last = bezier + 1 == contour_bezier[contour + 1]
     p = scale * bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
-    base = vertex_first[shape] + bezier_vertex[bezier]
+    base = vertices[0] + bezier_vertex[bezier]
     pieces = bezier_pieces[bezier]
     count = pieces
     if is_last and not closed:
@@ -171,7 +171,7 @@ def outline_forward(
         vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
     if is_last:
-        start = vertex_first[shape] + bezier_vertex[contour_bezier[contour]]
+        start = vertices[0] + bezier_vertex[contour_bezier[contour]]
         if not closed and kind[shape] != constants.FILL:
             start = constants.NONE
         vertex_next[base + count - 1] = start
@@ -188,8 +188,7 @@ def outline_backward(
     contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
     contour_closed: wp.array[wp.int32],  # [contour_count]
     scale: wp.float32,
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     bezier_vertex: wp.array[wp.int32],  # [bezier_count]
     bezier_pieces: wp.array[wp.int32],  # [bezier_count]
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts at a vertex
@@ -202,15 +201,16 @@ def outline_backward(
     contour = point_contour[point]
     shape = contour_shape[contour]
     total = wp.vec2(0.0, 0.0)
-    if vertex_last[shape] > vertex_first[shape]:
+    vertices = vertex_range[shape]
+    if vertices[1] > vertices[0]:
         closed = contour_closed[contour]
         index = point - contour_first[contour]
         count = contour_first[contour + 1] - contour_first[contour]
         bezier_base = contour_bezier[contour]
         beziers = contour_bezier[contour + 1] - bezier_base
-        first = vertex_first[shape] + bezier_vertex[bezier_base]
+        first = vertices[0] + bezier_vertex[bezier_base]
         # The vertex before the first, by way of the edge that closes the contour.
-        last = vertex_first[shape] + bezier_vertex[bezier_base + beziers - 1]
+        last = vertices[0] + bezier_vertex[bezier_base + beziers - 1]
         last += bezier_pieces[bezier_base + beziers - 1] - closed
         # The last Bézier that the point belongs to, which number it has there, and how those change for the
         # Béziers before: the point may end a cubic, and belongs to three quadratics.
@@ -226,7 +226,7 @@ def outline_backward(
             if closed != 0:
                 local = (latest + beziers) % beziers
             if local >= 0 and local < beziers:
-                base = vertex_first[shape] + bezier_vertex[bezier_base + local]
+                base = vertices[0] + bezier_vertex[bezier_base + local]
                 pieces = bezier_pieces[bezier_base + local]
                 for k in range(pieces + 1):
                     v = base + k

@@ -32,8 +32,7 @@ def clip_ranges(
     capacity: wp.int32,
     reverse: wp.int32,  # 1: entry i of the prefix sum belongs to range n - 1 - i
     # Out:
-    range_first: wp.array[wp.int32],  # [n]
-    range_last: wp.array[wp.int32],  # [n] one past the end; an empty range where the capacity is exceeded
+    ranges: wp.array[wp.vec2i],  # [n] first, and one past the end; empty where the capacity is exceeded
     needed: wp.array[wp.int32],  # [1] the largest total ever asked for; INT_MAX: more than 32 bits hold
 ):
     """Turn a prefix sum into ranges. A range that does not fit is left out whole and counted, never cut.
@@ -54,7 +53,6 @@ def clip_ranges(
     index = i
     if reverse == 1:
         index = n - 1 - i
-    range_first[index] = start
-    range_last[index] = end
+    ranges[index] = wp.vec2i(start, end)
     if i == n - 1:
         wp.atomic_max(needed, 0, ends[i])

@@ -74,12 +74,12 @@ def on_border(a: wp.float32, b: wp.float32) -> wp.bool:
 
 
 @wp.func
-def has_borders(first: wp.int32, last: wp.int32) -> wp.bool:
+def has_borders(vertices: wp.vec2i) -> wp.bool:
     """Return whether a shape has few enough vertices for the treatment of edges on borders of pixels.
 
     Winding numbers beside such an edge take a pass over all of the shape's edges.
     """
-    return last - first <= MOST_VERTICES
+    return vertices[1] - vertices[0] <= MOST_VERTICES
 
 
 @wp.kernel
@@ -114,10 +114,9 @@ def fill_states(
     part: wp.array[wp.int32],  # [shape_count]
     rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-    slot_first: wp.array[wp.int32],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     reach: wp.array[wp.vec2],  # [vertex_capacity / EDGE_BLOCK] px
@@ -131,7 +130,7 @@ def fill_states(
     a line through the middle of the row.
     """
     slot = offset + wp.tid()
-    row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+    row = tile_row(slot, slot_shape, slot_range, shape_tiles)
     shape = row[0]
     if shape < 0:
         return
@@ -146,9 +145,10 @@ def fill_states(
         slot_state[s] = 0
         slot_winding[s] = 0
     winding = int(0)
-    borders = has_borders(vertex_first[shape], vertex_last[shape])
-    last = vertex_last[shape]
-    first = vertex_first[shape]
+    vertices = vertex_range[shape]
+    borders = has_borders(vertices)
+    first = vertices[0]
+    last = vertices[1]
     while first < last:
         block = first / constants.EDGE_BLOCK
         stop = wp.min(constants.EDGE_BLOCK * (block + 1), last)
@@ -397,12 +397,11 @@ def make_forward(column: Any) -> wp.Kernel:
         part: wp.array[wp.int32],  # [shape_count]
         rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
         slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_range: wp.array[wp.vec2i],  # [shape_count]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         slot_winding: wp.array[wp.int32],  # [slot_capacity]
         shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-        vertex_first: wp.array[wp.int32],  # [shape_count]
-        vertex_last: wp.array[wp.int32],  # [shape_count]
+        vertex_range: wp.array[wp.vec2i],  # [shape_count]
         vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
         vertex: wp.array[wp.vec2],  # [vertex_capacity] px
         reach: wp.array[wp.vec2],  # [vertex_capacity / EDGE_BLOCK] px
@@ -417,11 +416,11 @@ def make_forward(column: Any) -> wp.Kernel:
         slot = offset + i
         tiles = wp.vec2i(0, 0)
         if by_rows:
-            tiles = partial_run(slot, slot_shape, slot_first, slot_state, shape_tiles)
+            tiles = partial_run(slot, slot_shape, slot_range, slot_state, shape_tiles)
             if tiles[0] == tiles[1]:
                 return
             slot -= tiles[0]
-        row = tile_row(slot, slot_shape, slot_first, shape_tiles)
+        row = tile_row(slot, slot_shape, slot_range, shape_tiles)
         shape = row[0]
         if shape < 0:
             return
@@ -444,8 +443,8 @@ def make_forward(column: Any) -> wp.Kernel:
         top = constants.TILE * row[3]
         row_first = top + lane * lane_rows
         left = float(constants.TILE * row[1])
-        last = vertex_last[shape]
-        first = vertex_first[shape]
+        first = vertex_range[shape][0]
+        last = vertex_range[shape][1]
         while first < last:
             block = first / constants.EDGE_BLOCK
             stop = wp.min(constants.EDGE_BLOCK * (block + 1), last)

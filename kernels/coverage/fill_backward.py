@@ -180,10 +180,8 @@ def fill_backward(
     rule: wp.array[wp.int32],  # [shape_count] NONZERO or EVENODD
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends
@@ -198,13 +196,15 @@ def fill_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if part[shape] != own_part or i < vertex_first[shape] or i >= vertex_last[shape]:
+    vertices = vertex_range[shape]
+    if part[shape] != own_part or i < vertices[0] or i >= vertices[1]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     start = vertex[i]
     d = vertex[vertex_next[i]] - start
-    if slot_last[shape] > slot_first[shape] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
+    slots = slot_range[shape]
+    if slots[1] > slots[0] and wp.abs(d[0]) + wp.abs(d[1]) > 0.0:
         # From here on, pixels are counted from the corner of the shape's tiles. Those of them that lie
         # outside the canvas have no gradient.
         across = shape_tiles[shape, 2] - shape_tiles[shape, 0]
@@ -213,14 +213,13 @@ def fill_backward(
         corner = float(constants.TILE) * wp.vec2(float(shape_tiles[shape, 0]), float(shape_tiles[shape, 1]))
         a = start - corner
         sums = wp.vec2(0.0, 0.0)
-        vertices = wp.vec2i(vertex_first[shape], vertex_last[shape])
         along = wp.where(is_upright(d), 0, 1)
-        if has_borders(vertices[0], vertices[1]) and on_border(start[along], start[along] + d[along]):
+        if has_borders(vertices) and on_border(start[along], start[along] + d[along]):
             size = wp.vec2i(wide, high)
             sums = sums_along_border(
                 sum_grad,
                 slot_state,
-                slot_first[shape],
+                slots[0],
                 size,
                 vertex,
                 vertex_next,
@@ -245,7 +244,7 @@ def fill_backward(
             inverse_y = 1.0 / d[1]
             s_x = leaves_at(x + ahead_x, a[0], d[0], inverse_x)
             s_y = leaves_at(y + ahead_y, a[1], d[1], inverse_y)
-            first = slot_first[shape]
+            first = slots[0]
             area = float(0.0)
             moment = float(0.0)
             while s < s_end and x >= 0 and x < wide and y >= 0 and y < high:

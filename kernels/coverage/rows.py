@@ -13,7 +13,7 @@ NO_ROW = wp.constant(-1)
 def one_tile(
     slot: wp.int32,
     slot_shape: wp.array[wp.int32],
-    slot_first: wp.array[wp.int32],
+    slot_range: wp.array[wp.vec2i],
     shape_tiles: wp.array2d[wp.int32],
 ) -> wp.vec4i:
     """Return (shape, tile's x, 1, tile's y) of ``slot`` as a row of one tile; the shape is NO_ROW where the
@@ -23,7 +23,7 @@ def one_tile(
     if shape < 0:
         return wp.vec4i(NO_ROW, 0, 0, 0)
     wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-    local = slot - slot_first[shape]
+    local = slot - slot_range[shape][0]
     return wp.vec4i(shape, shape_tiles[shape, 0] + local % wide, 1, shape_tiles[shape, 1] + local / wide)
 
 
@@ -31,13 +31,13 @@ def one_tile(
 def tile_row(
     slot: wp.int32,
     slot_shape: wp.array[wp.int32],
-    slot_first: wp.array[wp.int32],
+    slot_range: wp.array[wp.vec2i],
     shape_tiles: wp.array2d[wp.int32],
 ) -> wp.vec4i:
     """Return (shape, leftmost tile, width [tiles], tile's y) of the row that starts at ``slot``; the shape is
     NO_ROW where none does.
     """
-    tile = one_tile(slot, slot_shape, slot_first, shape_tiles)
+    tile = one_tile(slot, slot_shape, slot_range, shape_tiles)
     shape = tile[0]
     if shape < 0:
         return tile
@@ -51,7 +51,7 @@ def tile_row(
 def partial_run(
     slot: wp.int32,
     slot_shape: wp.array[wp.int32],
-    slot_first: wp.array[wp.int32],
+    slot_range: wp.array[wp.vec2i],
     slot_state: wp.array[wp.int32],
     shape_tiles: wp.array2d[wp.int32],
 ) -> wp.vec2i:
@@ -62,7 +62,7 @@ def partial_run(
     if shape < 0 or slot_state[slot] & constants.PARTIAL != constants.PARTIAL:
         return wp.vec2i(0, 0)
     wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-    first = (slot - slot_first[shape]) % wide
+    first = (slot - slot_range[shape][0]) % wide
     if first > 0:
         if slot_state[slot - 1] & constants.PARTIAL == constants.PARTIAL:
             return wp.vec2i(0, 0)

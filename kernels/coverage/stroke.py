@@ -201,8 +201,7 @@ def segment_rectangles(
     scale: wp.float32,
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px
     # Out:
@@ -217,7 +216,8 @@ def segment_rectangles(
     shape = vertex_shape[i]
     if part[shape] != constants.STROKE:
         return
-    if i < vertex_first[shape] or i >= vertex_last[shape] or vertex_next[i] == constants.NONE:
+    vertices = vertex_range[shape]
+    if i < vertices[0] or i >= vertices[1] or vertex_next[i] == constants.NONE:
         segment_box[i] = wp.vec4(FAR, -FAR, FAR, -FAR)
         return
     reach = half_width(widths[shape], scale) + HALF_DIAGONAL
@@ -225,7 +225,7 @@ def segment_rectangles(
     d = vertex[vertex_next[i]] - a
     length = wp.length(d)
     e = direction(d, length)
-    over = overhang(vertex, vertex_next, i, vertex_first[shape], reach)
+    over = overhang(vertex, vertex_next, i, vertices[0], reach)
     segment_box[i] = box_around(a, e, length, reach, over)
     segment_ends[i] = short_sides(e, length, over)
     segment_sides[i] = long_sides(e, reach)
@@ -352,13 +352,12 @@ def make_forward(column: Any) -> wp.Kernel:
         # In:
         offset: wp.int32,
         slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_range: wp.array[wp.vec2i],  # [shape_count]
         part: wp.array[wp.int32],  # [shape_count]
         widths: wp.array[wp.float32],  # [shape_count] canvas units
         scale: wp.float32,
         shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-        vertex_first: wp.array[wp.int32],  # [shape_count]
-        vertex_last: wp.array[wp.int32],  # [shape_count]
+        vertex_range: wp.array[wp.vec2i],  # [shape_count]
         vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
         vertex: wp.array[wp.vec2],  # [vertex_capacity] px
         segment_box: wp.array[wp.vec4],  # [vertex_capacity] px, see segment_rectangles
@@ -376,7 +375,7 @@ def make_forward(column: Any) -> wp.Kernel:
         """
         i, lane = wp.tid()
         slot = offset + i
-        row = own_row(slot, slot_shape, slot_first, shape_tiles)
+        row = own_row(slot, slot_shape, slot_range, shape_tiles)
         shape = row[0]
         if shape < 0:
             return
@@ -400,7 +399,8 @@ def make_forward(column: Any) -> wp.Kernel:
                     coverage_pixels[s, constants.TILE * x + lane] = 0.0
                 else:
                     coverage[s, x] = column(0.0)
-        for j in range(vertex_first[shape], vertex_last[shape]):
+        vertices = vertex_range[shape]
+        for j in range(vertices[0], vertices[1]):
             box = segment_box[j]
             near_rows = pixels_within(box[2], box[3], rows[0], rows[1])
             if near_rows[0] < near_rows[1] and box[0] < float(columns[1]) and box[1] > float(columns[0]):
@@ -444,10 +444,8 @@ def stroke_backward(
     scale: wp.float32,
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity]
     vertex_ends: wp.array[wp.int32],  # [shape_count] end of each shape's vertices
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the segment that starts here ends, or NONE
@@ -467,12 +465,14 @@ def stroke_backward(
     if i >= vertex_ends[vertex_ends.shape[0] - 1]:
         return
     shape = vertex_shape[i]
-    if part[shape] != constants.STROKE or i < vertex_first[shape] or i >= vertex_last[shape]:
+    vertices = vertex_range[shape]
+    if part[shape] != constants.STROKE or i < vertices[0] or i >= vertices[1]:
         return
     at_start = wp.vec2(0.0, 0.0)
     at_end = wp.vec2(0.0, 0.0)
     of_half = float(0.0)
-    if slot_last[shape] > slot_first[shape] and vertex_next[i] != constants.NONE:
+    slots = slot_range[shape]
+    if slots[1] > slots[0] and vertex_next[i] != constants.NONE:
         half = half_width(widths[shape], scale)
         x0 = shape_tiles[shape, 0]
         y0 = shape_tiles[shape, 1]
@@ -485,7 +485,7 @@ def stroke_backward(
         bottom = wp.min(height, constants.TILE * shape_tiles[shape, 3])
         ys = pixels_within(box[2], box[3], constants.TILE * y0, bottom)
         for y in range(ys[0], ys[1]):
-            slot_row = slot_first[shape] + (y / constants.TILE - y0) * wide - x0
+            slot_row = slots[0] + (y / constants.TILE - y0) * wide - x0
             span = segment_span(a[0], float(y) + 0.5 - a[1], segment_ends[i], segment_sides[i])
             xs = pixels_within(span[0], span[1], constants.TILE * x0, right)
             for x in range(xs[0], xs[1]):
@@ -519,8 +519,7 @@ def widths_backward(
     offset: wp.int32,
     part: wp.array[wp.int32],  # [shape_count]
     scale: wp.float32,
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     half_grad: wp.array[wp.float32],  # [vertex_capacity]
     # Out:
     widths_grad: wp.array[wp.float32],  # [shape_count] written
@@ -530,6 +529,7 @@ def widths_backward(
     if part[shape] != constants.STROKE:
         return
     total = float(0.0)
-    for i in range(vertex_first[shape], vertex_last[shape]):
+    vertices = vertex_range[shape]
+    for i in range(vertices[0], vertices[1]):
         total += half_grad[i]
     widths_grad[shape] = 0.5 * scale * total

@@ -53,8 +53,7 @@ def flat_backward(
     # In:
     offset: wp.int32,
     paint: wp.array[wp.int32],  # [shape_count]
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     slot_columns: wp.array2d[tile_column],  # [slot_capacity, 4]
     # Out:
@@ -69,7 +68,8 @@ def flat_backward(
     green = tile_column(0.0)
     blue = tile_column(0.0)
     opacity = tile_column(0.0)
-    for slot in range(slot_first[shape], slot_last[shape]):
+    slots = slot_range[shape]
+    for slot in range(slots[0], slots[1]):
         if is_visible(slot_state[slot]):
             red = red + slot_columns[slot, 0]
             green = green + slot_columns[slot, 1]
@@ -87,8 +87,7 @@ def flat_backward(
 def sum_slots(
     # In:
     offset: wp.int32,
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     slot_grad: wp.array2d[wp.vec4],  # [slot_capacity, lanes]
     # Out:
@@ -100,7 +99,8 @@ def sum_slots(
     i, lane = wp.tid()
     shape = offset + i
     sums = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    for slot in range(slot_first[shape], slot_last[shape]):
+    slots = slot_range[shape]
+    for slot in range(slots[0], slots[1]):
         if is_visible(slot_state[slot]):
             sums = sums + slot_grad[slot, lane]
     lane_grad[shape, lane] = sums

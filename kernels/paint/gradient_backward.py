@@ -109,8 +109,7 @@ def gradient_backward(
     offset: wp.int32,
     tiles_x: wp.int32,
     scale: wp.float32,
-    slot_first: wp.array[wp.int32],  # [shape_count]
-    slot_last: wp.array[wp.int32],  # [shape_count]
+    slot_range: wp.array[wp.vec2i],  # [shape_count]
     slot_tile: wp.array[wp.int32],  # [slot_capacity]
     slot_state: wp.array[wp.int32],  # [slot_capacity]
     g: Gradients,
@@ -139,7 +138,8 @@ def gradient_backward(
     origin = wp.vec2(0.0, 0.0)
     along = wp.vec2(0.0, 0.0)
     across = wp.vec2(0.0, 0.0)
-    for slot in range(slot_first[shape], slot_last[shape]):
+    slots = slot_range[shape]
+    for slot in range(slots[0], slots[1]):
         state = slot_state[slot]
         if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
             for p in range(constants.TILE * constants.TILE):
@@ -185,8 +185,7 @@ def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
         offset: wp.int32,
         tiles_x: wp.int32,
         scale: wp.float32,
-        slot_first: wp.array[wp.int32],  # [shape_count]
-        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_range: wp.array[wp.vec2i],  # [shape_count]
         slot_tile: wp.array[wp.int32],  # [slot_capacity]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         g: Gradients,
@@ -241,7 +240,8 @@ def make_backward(column: Any, case: Literal[0, 1, 2]) -> wp.Kernel:
         v_by_u = zero
         v_by_v = zero
         columns = int(constants.TILE * parts)  # not unrolled, which takes long to compile
-        for slot in range(slot_first[shape], slot_last[shape]):
+        slots = slot_range[shape]
+        for slot in range(slots[0], slots[1]):
             state = slot_state[slot]
             if state & constants.COVERED != 0 and state & constants.HIDDEN == 0:
                 for x in range(columns):

@@ -249,12 +249,10 @@ def walk_strokes(
     contour_closed: wp.array[wp.int32],  # [contour_count]
     bezier_vertex: wp.array[wp.int32],  # [bezier_count]
     bezier_pieces: wp.array[wp.int32],  # [bezier_count]
-    vertex_first: wp.array[wp.int32],  # [shape_count]
-    vertex_last: wp.array[wp.int32],  # [shape_count]
+    vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px; of the centre lines
     vertex_next: wp.array[wp.int32],  # [vertex_capacity]
-    corner_first: wp.array[wp.int32],  # [shape_count]
-    corner_last: wp.array[wp.int32],  # [shape_count]
+    corner_range: wp.array[wp.vec2i],  # [shape_count]
     # Out:
     corner_count: wp.array[wp.int32],  # [shape_count] when counting
     corner_segments: wp.array[wp.vec2i],  # [vertex_capacity] this and what follows when writing
@@ -266,7 +264,8 @@ def walk_strokes(
     shape = offset + wp.tid()
     if write == 0:
         corner_count[shape] = 0
-    if part[shape] != constants.STYLED or vertex_last[shape] == vertex_first[shape]:
+    vertices = vertex_range[shape]
+    if part[shape] != constants.STYLED or vertices[1] == vertices[0]:
         return
     style = Style()
     style.half = half_width(widths[shape], scale)
@@ -275,11 +274,11 @@ def walk_strokes(
     style.miter_limit = miter_limits[shape]
     first = int(0)
     if write != 0:
-        first = corner_first[shape]
-        if corner_last[shape] == first:
+        first = corner_range[shape][0]
+        if corner_range[shape][1] == first:
             return
         reach = style.half * wp.where(style.cap == constants.SQUARE, ROOT_TWO, 1.0) + 1.0
-        for i in range(vertex_first[shape], vertex_last[shape]):
+        for i in range(vertices[0], vertices[1]):
             extent[i] = wp.vec2(reach, reach)
     out = Polygons()
     out.write = write
@@ -299,7 +298,7 @@ def walk_strokes(
         n = walk_contour(
             n,
             contour_closed[contour],
-            vertex_first[shape],
+            vertices[0],
             beziers,
             bezier_vertex,
             bezier_pieces,

@@ -21,12 +21,12 @@ def ranges_of(counts: list[int], device: str, *, reverse: bool = False) -> tuple
     """Ranges, shape (count, 2), and the need."""
     backend = Backend.on(device)
     wanted = wp.array(np.array(counts, np.int32), dtype=wp.int32, device=device)
-    ends, first, last = (backend.array(wp.int32, len(wanted)) for _ in range(3))
+    ends, ranges = backend.array(wp.int32, len(wanted)), backend.array(wp.vec2i, len(wanted))
     needed = backend.array(wp.int32, 1)
     program = backend.program()
-    record_ranges(program, wanted, ends, first, last, needed, capacity=CAPACITY, reverse=reverse)
+    record_ranges(program, wanted, ends, ranges, needed, capacity=CAPACITY, reverse=reverse)
     program.run()
-    return np.stack([first.numpy(), last.numpy()], axis=1), int(needed.numpy()[0])
+    return ranges.numpy(), int(needed.numpy()[0])
 
 
 @pytest.mark.parametrize("reverse", [False, True])

@@ -41,7 +41,7 @@ def test_vertices(device: str, scale: float) -> None:
     scene = mixed_scene(seed=5)
     renderer = renderer_for(scene, device, scale)
     buffers = outline_of(renderer)
-    vertex, firsts, lasts = (x.numpy() for x in (buffers.vertex, buffers.vertex_first, buffers.vertex_last))
+    vertex, (firsts, lasts) = buffers.vertex.numpy(), buffers.vertex_range.numpy().T
     for shape, pieces in enumerate(pieces_of(renderer)):
         kind, basis = Kind(int(scene.kind[shape])), Basis(int(scene.basis[shape]))
         assert min(pieces) >= (3 if basis == Basis.CUBIC else 2)

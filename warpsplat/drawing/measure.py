@@ -198,7 +198,7 @@ class Measure:
         b, arrays = self._outline, self._parameters.arrays
         counts = b.bezier_pieces.numpy().astype(np.intp)
         shape = arrays["contour_shape"].numpy()[arrays["bezier_contour"].numpy()]
-        base = b.vertex_first.numpy()[shape] + b.bezier_vertex.numpy()
+        base = b.vertex_range.numpy()[shape, 0] + b.bezier_vertex.numpy()
         cubic = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(cubic)) - np.repeat(np.cumsum(counts) - counts, counts)
         vertex = base[cubic] + number

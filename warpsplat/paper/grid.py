@@ -25,8 +25,8 @@ class GridBuffers:
     """How many Gaussians each shape has along and across."""
     gaussian_count: wp.array = buffer(wp.int32, "shapes")
     gaussian_ends: wp.array = buffer(wp.int32, "shapes")
-    gaussian_first: wp.array = buffer(wp.int32, "shapes")
-    gaussian_last: wp.array = buffer(wp.int32, "shapes")
+    gaussian_range: wp.array = buffer(wp.vec2i, "shapes")
+    """First, and one past the last."""
     gaussian_shape: wp.array = buffer(wp.int32, "gaussians")
     """-1 for those not in use."""
     gaussian_across: wp.array = buffer(wp.float32, "gaussians")
@@ -112,12 +112,7 @@ class Grid:
     def samples(self) -> dict[str, wp.array]:
         """Return the parameters of ``bins.rectangles``."""
         b = self.buffers
-        return {
-            "sample_first": b.gaussian_first,
-            "sample_last": b.gaussian_last,
-            "position": b.mean,
-            "extent": b.extent,
-        }
+        return {"sample_range": b.gaussian_range, "position": b.mean, "extent": b.extent}
 
     def _launch(self, program: Program, kernel: wp.Kernel, dim: int, **values: float) -> None:
         program.launch(kernel, dim, *self._sources, split=True, **values)
@@ -130,7 +125,7 @@ class Grid:
         else:
             size = {"soft": 0, "density": 1.0}
         self._launch(program, plan.plan_grid, shapes, **size)
-        ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_first, b.gaussian_last)
+        ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_range)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity)
         for kernels in self._kernels:
             self._launch(program, kernels.forward, self._capacity)

@@ -22,8 +22,8 @@ class BinBuffers:
     """Rectangle of tiles of each shape: x0, y0, x1, y1, ends excluded."""
     front_slots: wp.array = buffer(wp.int32, "shapes")
     front_ends: wp.array = buffer(wp.int32, "shapes")
-    slot_first: wp.array = buffer(wp.int32, "shapes")
-    slot_last: wp.array = buffer(wp.int32, "shapes")
+    slot_range: wp.array = buffer(wp.vec2i, "shapes")
+    """First, and one past the last."""
     slot_shape: wp.array = buffer(wp.int32, "slots")
     """-1 for those not in use."""
     slot_tile: wp.array = buffer(wp.int32, "slots")
@@ -74,7 +74,7 @@ class Bins:
         """Record samples -> slots, and each tile's range of them."""
         b, shapes, tiles = self.buffers, self._parameters.shape_count, self._viewport.tile_count
         program.launch(bins.rectangles, shapes, b, samples, self._viewport, split=True)
-        ranges = (b.front_slots, b.front_ends, b.slot_first, b.slot_last)
+        ranges = (b.front_slots, b.front_ends, b.slot_range)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity, reverse=True)
         program.launch(bins.fill_slots, self._capacity, b, self._viewport, split=True)
         bits = tiles.bit_length()  # in which the keys of unused slots, INT_MAX, are still the largest

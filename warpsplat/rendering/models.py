@@ -17,7 +17,7 @@ class Geometry(Protocol):
     """Interface of the stage that samples the shapes, for binning."""
 
     def samples(self) -> dict[str, wp.array]:
-        """``sample_first``, ``sample_last``, ``position`` and ``extent`` of ``kernels.bins.rectangles``."""
+        """``sample_range``, ``position`` and ``extent`` of ``kernels.bins.rectangles``."""
 
     def forward(self, program: Program) -> None:
         """Record attributes -> samples."""

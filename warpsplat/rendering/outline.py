@@ -27,8 +27,8 @@ class OutlineBuffers:
     """Straight pieces of each Bézier."""
     vertex_count: wp.array = buffer(wp.int32, "shapes")
     vertex_ends: wp.array = buffer(wp.int32, "shapes")
-    vertex_first: wp.array = buffer(wp.int32, "shapes")
-    vertex_last: wp.array = buffer(wp.int32, "shapes")
+    vertex_range: wp.array = buffer(wp.vec2i, "shapes")
+    """First, and one past the last."""
     vertex_shape: wp.array = buffer(wp.int32, "vertices")
     vertex_next: wp.array = buffer(wp.int32, "vertices")
     """End of the edge that starts at a vertex."""
@@ -65,18 +65,13 @@ class Outline:
     def samples(self) -> dict[str, wp.array]:
         """Return the samples that tiles are found from, as ``bins.rectangles`` takes them."""
         b = self.buffers
-        return {
-            "sample_first": b.vertex_first,
-            "sample_last": b.vertex_last,
-            "position": b.vertex,
-            "extent": b.extent,
-        }
+        return {"sample_range": b.vertex_range, "position": b.vertex, "extent": b.extent}
 
     def forward(self, program: Program) -> None:
         """Record points, widths -> vertices."""
         b, p = self.buffers, self._parameters
         program.launch(outline.plan_outline, p.shape_count, *self._sources, slack=self._slack)
-        ranges = (b.vertex_count, b.vertex_ends, b.vertex_first, b.vertex_last)
+        ranges = (b.vertex_count, b.vertex_ends, b.vertex_range)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity)
         program.launch(outline.outline_forward, p.bezier_count, *self._sources, split=True)
         if self.stroker:

@@ -12,14 +12,13 @@ def record_ranges(
     program: Program,
     count: wp.array,
     ends: wp.array,
-    first: wp.array,
-    last: wp.array,
+    found: wp.array,
     needed: wp.array,
     *,
     capacity: int,
     reverse: bool = False,
 ) -> None:
-    """Record the prefix sum of ``count`` into ``ends``, and the ranges that fit into ``capacity``."""
+    """Record the prefix sum of ``count`` into ``ends``, and into ``found`` the ranges within ``capacity``."""
     if count.shape[0] == 0:
         return
     program.call(wp.utils.array_scan, count, ends, True)
@@ -28,8 +27,7 @@ def record_ranges(
         count.shape[0],
         count=count,
         ends=ends,
-        range_first=first,
-        range_last=last,
+        ranges=found,
         needed=needed,
         capacity=capacity,
         reverse=int(reverse),

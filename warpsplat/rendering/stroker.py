@@ -20,8 +20,8 @@ class StrokerBuffers:
 
     corner_count: wp.array = buffer(wp.int32, "shapes")
     corner_ends: wp.array = buffer(wp.int32, "shapes")
-    corner_first: wp.array = buffer(wp.int32, "shapes")
-    corner_last: wp.array = buffer(wp.int32, "shapes")
+    corner_range: wp.array = buffer(wp.vec2i, "shapes")
+    """First, and one past the last."""
     corner_segments: wp.array = buffer(wp.vec2i, "corners")
     """Segments of the centre line that a corner hangs on."""
     corner_place: wp.array = buffer(wp.vec4, "corners")
@@ -56,8 +56,7 @@ class Stroker:
             "vertex_shape": b.corner_shape,
             "vertex_next": b.corner_next,
             "vertex_ends": b.corner_ends,
-            "vertex_first": b.corner_first,
-            "vertex_last": b.corner_last,
+            "vertex_range": b.corner_range,
             "start_grad": b.corner_start_grad,
             "end_grad": b.corner_end_grad,
         }
@@ -66,7 +65,7 @@ class Stroker:
         """Record centre lines, widths -> corners; and how far these reach."""
         b, shapes = self.buffers, self._inputs.parameters.shape_count
         program.launch(walk_strokes, shapes, *self._sources, write=0, split=True)
-        ranges = (b.corner_count, b.corner_ends, b.corner_first, b.corner_last)
+        ranges = (b.corner_count, b.corner_ends, b.corner_range)
         record_ranges(program, *ranges, self._inputs.needed, capacity=self._inputs.samples)
         program.launch(walk_strokes, shapes, *self._sources, write=1, split=True)
         program.launch(corners.place_corners, self._inputs.samples, *self._sources, split=True)

@@ -94,7 +94,7 @@ def fill_stations_backward(
     kind: wp.array[wp.int32],  # [shape_count]
     scale: wp.float32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity] of the grid positions
@@ -109,7 +109,7 @@ def fill_stations_backward(
     if kind[shape] != constants.FILL:
         return
     stations = shape_grid[shape].stations
-    if i - gaussian_first[shape] >= stations:
+    if i - gaussian_range[shape][0] >= stations:
         return
     a_grad = wp.vec2(0.0, 0.0)
     b_grad = wp.vec2(0.0, 0.0)
@@ -129,8 +129,7 @@ def fill_points_backward(
     kind: wp.array[wp.int32],  # [shape_count]
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     point_shape: wp.array[wp.int32],  # [point_count]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     # Out:
@@ -145,8 +144,8 @@ def fill_points_backward(
     point_count = 6 * cubics
     point = i - point_first[shape]
     total = wp.vec2(0.0, 0.0)
-    start = gaussian_first[shape]
-    if gaussian_last[shape] > start:
+    gaussians = gaussian_range[shape]
+    if gaussians[1] > gaussians[0]:
         stations = shape_grid[shape].stations
         for chain in range(2):
             index = ring_index(chain, point, point_count)
@@ -156,5 +155,5 @@ def fill_points_backward(
                     segment = segment_at(t, cubics)
                     if index >= 3 * segment and index <= 3 * segment + 3:
                         weight = cubic_weights(t - float(segment))[index - 3 * segment]
-                        total += weight * station_grad[start + chain * stations + station]
+                        total += weight * station_grad[gaussians[0] + chain * stations + station]
     points_grad[i] = total

@@ -137,7 +137,7 @@ def gaussians_forward(
     # In:
     offset: wp.int32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
@@ -151,7 +151,7 @@ def gaussians_forward(
     if shape < 0:
         return
     grid = shape_grid[shape]
-    index = i - gaussian_first[shape]
+    index = i - gaussian_range[shape][0]
     dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
@@ -173,7 +173,7 @@ def differences_backward(
     # In:
     offset: wp.int32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] (of a, b, c)
@@ -202,7 +202,7 @@ def differences_backward(
     along_grad[i] = wp.vec2(0.0, 0.0)
     across_grad[i] = wp.vec2(0.0, 0.0)
     grid = shape_grid[shape]
-    dx, dr, straight = differences_at(mean, i, i - gaussian_first[shape], grid)
+    dx, dr, straight = differences_at(mean, i, i - gaussian_range[shape][0], grid)
     length = wp.length(dx)
     if length < constants.EPSILON:
         return
@@ -225,7 +225,7 @@ def positions_backward(
     # In:
     offset: wp.int32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     along_grad: wp.array[wp.vec2],  # [gaussian_capacity] of Dx
@@ -240,8 +240,8 @@ def positions_backward(
         return
     grid = shape_grid[shape]
     run = grid.stations / grid.runs
-    station = (i - gaussian_first[shape]) % grid.stations % run
-    row = (i - gaussian_first[shape]) / grid.stations
+    station = (i - gaussian_range[shape][0]) % grid.stations % run
+    row = (i - gaussian_range[shape][0]) / grid.stations
     total = mean_grad[i]
     for k in range(wp.max(station - 1, 0), wp.min(station + 2, run)):
         total += difference_weight(k, station, run) * along_grad[i + k - station]

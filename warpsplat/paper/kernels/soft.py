@@ -58,7 +58,7 @@ def soft_gaussians_forward(
     scale: wp.float32,
     softness: wp.float32,  # canvas units
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     # Out:
@@ -73,7 +73,7 @@ def soft_gaussians_forward(
     if shape < 0:
         return
     grid = shape_grid[shape]
-    index = i - gaussian_first[shape]
+    index = i - gaussian_range[shape][0]
     dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     reach = paper.SPREAD * straight * length
@@ -101,7 +101,7 @@ def soft_differences_backward(
     scale: wp.float32,
     softness: wp.float32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     mean: wp.array[wp.vec2],  # [gaussian_capacity] px
     conic_grad: wp.array[wp.vec3],  # [gaussian_capacity] (of a, b, c)
@@ -120,7 +120,7 @@ def soft_differences_backward(
     if shape < 0:
         return
     grid = shape_grid[shape]
-    index = i - gaussian_first[shape]
+    index = i - gaussian_range[shape][0]
     dx, dr, straight = differences_at(mean, i, index, grid)
     length = wp.length(dx)
     e = wp.vec2(1.0, 0.0)
@@ -155,8 +155,7 @@ def soft_stroke_backward(
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     point_shape: wp.array[wp.int32],  # [point_count]
     scale: wp.float32,
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     # Out:
@@ -167,18 +166,18 @@ def soft_stroke_backward(
     shape = point_shape[i]
     if kind[shape] != constants.STROKE:
         return
-    start = gaussian_first[shape]
+    gaussians = gaussian_range[shape]
     point = i - point_first[shape]
     segments = (point_first[shape + 1] - point_first[shape]) / 3
     total = wp.vec2(0.0, 0.0)
-    if gaussian_last[shape] > start:
+    if gaussians[1] > gaussians[0]:
         stations = shape_grid[shape].stations
         each = stations / segments
         for station in range(stations):
             j = point - 3 * (station / each)
             if j >= 0 and j <= 3:
                 weights = cubic_weights((float(station % each) + 0.5) / float(each))
-                total += weights[j] * position_grad[start + station]
+                total += weights[j] * position_grad[gaussians[0] + station]
     points_grad[i] = scale * total
 
 
@@ -188,8 +187,7 @@ def soft_shapes_backward(
     offset: wp.int32,
     opacities: wp.array[wp.float32],  # [shape_count]
     fades: wp.array[wp.vec3],  # [shape_count]
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     strength_grad: wp.array[wp.float32],  # [gaussian_capacity]
     gaussian_width_grad: wp.array[wp.float32],  # [gaussian_capacity]
@@ -202,11 +200,12 @@ def soft_shapes_backward(
     gradient that leads back counts.
     """
     shape = offset + wp.tid()
+    gaussians = gaussian_range[shape]
     stations = shape_grid[shape].stations
     width = float(0.0)
     sums = wp.vec3(0.0, 0.0, 0.0)
-    for i in range(gaussian_first[shape], gaussian_last[shape]):
-        k = third((i - gaussian_first[shape]) % stations, stations)
+    for i in range(gaussians[0], gaussians[1]):
+        k = third((i - gaussians[0]) % stations, stations)
         sums[k] = sums[k] + paper.GAUSSIAN_MAX * strength_grad[i]
         width += gaussian_width_grad[i]
     for k in range(3):

@@ -81,10 +81,9 @@ def make_forward(column: Any, *, soft: bool) -> wp.Kernel:
         offset: wp.int32,
         lanes: wp.int32,  # threads that share the columns of a row of tiles
         slot_shape: wp.array[wp.int32],  # [slot_capacity] -1: unused
-        slot_first: wp.array[wp.int32],  # [shape_count]
+        slot_range: wp.array[wp.vec2i],  # [shape_count]
         shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
-        gaussian_first: wp.array[wp.int32],  # [shape_count]
-        gaussian_last: wp.array[wp.int32],  # [shape_count]
+        gaussian_range: wp.array[wp.vec2i],  # [shape_count]
         mean: wp.array[wp.vec2],  # [gaussian_capacity] px
         conic: wp.array[wp.vec3],  # [gaussian_capacity]
         extent: wp.array[wp.vec2],  # [gaussian_capacity] px
@@ -101,7 +100,7 @@ def make_forward(column: Any, *, soft: bool) -> wp.Kernel:
         if shape < 0:
             return
         wide = shape_tiles[shape, 2] - shape_tiles[shape, 0]
-        local = slot - slot_first[shape]
+        local = slot - slot_range[shape][0]
         if local % wide != 0:
             return
         part = lane % parts
@@ -115,7 +114,8 @@ def make_forward(column: Any, *, soft: bool) -> wp.Kernel:
         while x < right:
             coverage[slot + (x - left) / constants.TILE, parts * ((x - left) % constants.TILE) + part] = one
             x += step
-        for j in range(gaussian_first[shape], gaussian_last[shape]):
+        gaussians = gaussian_range[shape]
+        for j in range(gaussians[0], gaussians[1]):
             m = mean[j]
             e = extent[j]
             if m[1] + e[1] >= top and m[1] - e[1] <= top + float(height):
@@ -162,8 +162,7 @@ def make_backward(column: Any, *, soft: bool) -> wp.Kernel:
         # In:
         offset: wp.int32,
         gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-        slot_first: wp.array[wp.int32],  # [shape_count]
-        slot_last: wp.array[wp.int32],  # [shape_count]
+        slot_range: wp.array[wp.vec2i],  # [shape_count]
         slot_state: wp.array[wp.int32],  # [slot_capacity]
         shape_tiles: wp.array2d[wp.int32],  # [shape_count, 4]
         mean: wp.array[wp.vec2],  # [gaussian_capacity]
@@ -191,8 +190,8 @@ def make_backward(column: Any, *, soft: bool) -> wp.Kernel:
         con_grad = wp.vec3(0.0, 0.0, 0.0)
         zero = column(0.0)
         sum_p = zero
-        start = slot_first[shape]
-        if slot_last[shape] > start:
+        slots = slot_range[shape]
+        if slots[1] > slots[0]:
             m = mean[i]
             e = extent[i]
             con = conic[i]
@@ -217,7 +216,7 @@ def make_backward(column: Any, *, soft: bool) -> wp.Kernel:
             for y in range(y_first, wp.min(parts * shape_tiles[shape, 3], y_stop)):
                 dy = rows + column(float(height * y) - m[1])
                 c_dy = (EXPONENT * con[2]) * dy
-                slot_row = start + (y / parts - shape_tiles[shape, 1]) * wide
+                slot_row = slots[0] + (y / parts - shape_tiles[shape, 1]) * wide
                 # Moments by row of pixels: few enough to stay in registers.
                 moment0 = zero
                 moment1 = zero

@@ -137,8 +137,7 @@ def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Ker
         point_first: wp.array[wp.int32],  # [shape_count + 1]
         scale: wp.float32,
         gaussian_ends: wp.array[wp.int32],  # [shape_count]
-        gaussian_first: wp.array[wp.int32],  # [shape_count]
-        gaussian_last: wp.array[wp.int32],  # [shape_count]
+        gaussian_range: wp.array[wp.vec2i],  # [shape_count]
         shape_grid: wp.array[ShapeGrid],  # [shape_count]
         # Out:
         gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
@@ -154,10 +153,10 @@ def make_grid_forward(name: str, own_kind: int, position: wp.Function) -> wp.Ker
         if kind[shape] != own_kind:
             return
         gaussian_shape[i] = -1
-        if i >= gaussian_last[shape]:
+        if i >= gaussian_range[shape][1]:
             return
         grid = shape_grid[shape]
-        index = i - gaussian_first[shape]
+        index = i - gaussian_range[shape][0]
         place = Place()
         place.start = point_first[shape]
         place.count = point_first[shape + 1] - point_first[shape]

@@ -115,7 +115,7 @@ def stroke_stations_backward(
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     scale: wp.float32,
     gaussian_shape: wp.array[wp.int32],  # [gaussian_capacity] -1: unused
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     gaussian_across: wp.array[wp.float32],  # [gaussian_capacity]
     position_grad: wp.array[wp.vec2],  # [gaussian_capacity]
@@ -133,7 +133,7 @@ def stroke_stations_backward(
     if kind[shape] != constants.STROKE:
         return
     grid = shape_grid[shape]
-    station = i - gaussian_first[shape]
+    station = i - gaussian_range[shape][0]
     if station >= grid.stations:
         return
     run = grid.stations / grid.runs
@@ -170,8 +170,7 @@ def stroke_points_backward(
     point_first: wp.array[wp.int32],  # [shape_count + 1]
     point_shape: wp.array[wp.int32],  # [point_count]
     scale: wp.float32,
-    gaussian_first: wp.array[wp.int32],  # [shape_count]
-    gaussian_last: wp.array[wp.int32],  # [shape_count]
+    gaussian_range: wp.array[wp.vec2i],  # [shape_count]
     shape_grid: wp.array[ShapeGrid],  # [shape_count]
     station_grad: wp.array[wp.vec2],  # [gaussian_capacity]
     station_width_grad: wp.array[wp.float32],  # [gaussian_capacity]
@@ -185,10 +184,11 @@ def stroke_points_backward(
     if kind[shape] != constants.STROKE:
         return
     point = i - point_first[shape]
-    start = gaussian_first[shape]
+    gaussians = gaussian_range[shape]
+    start = gaussians[0]
     total = wp.vec2(0.0, 0.0)
     width_total = float(0.0)
-    if gaussian_last[shape] > start:
+    if gaussians[1] > start:
         grid = shape_grid[shape]
         run = grid.stations / grid.runs
         for station in range(grid.stations):
