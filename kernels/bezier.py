@@ -13,6 +13,19 @@ control_points: Any = wp.types.matrix(shape=(4, 2), dtype=wp.float32)
 """The control points of a cubic, a row each."""
 
 
+@wp.struct
+class Contour:
+    """Where a contour's control points and Béziers are."""
+
+    shape: wp.int32
+    basis: wp.int32  # CUBIC or SPLINE
+    closed: wp.int32
+    first: wp.int32  # control point
+    count: wp.int32  # of these
+    bezier: wp.int32  # its first
+    beziers: wp.int32  # their number
+
+
 @wp.func
 def cubic_weights(t: wp.float32) -> wp.vec4:
     """Return the four cubic Bernstein weights at ``t`` in [0, 1] (paper eq. 2, M = 3); they sum to 1."""
@@ -45,18 +58,11 @@ def chain_end(at_end: wp.bool) -> wp.float32:
 
 
 @wp.func
-def bezier_points(
-    points: wp.array[wp.vec2],
-    closed: wp.int32,
-    basis: wp.int32,
-    first: wp.int32,
-    count: wp.int32,
-    local: wp.int32,
-) -> control_points:
-    """Return Bézier ``local`` of a contour with ``count`` points from ``first`` on, as a cubic: of a spline,
-    its quadratic with the degree elevated.
-    """
-    if basis == constants.CUBIC:
+def bezier_points(points: wp.array[wp.vec2], contour: Contour, local: wp.int32) -> control_points:
+    """Return Bézier ``local`` of a contour as a cubic: of a spline, its quadratic in a higher degree."""
+    first = contour.first
+    count = contour.count
+    if contour.basis == constants.CUBIC:
         i = first + 3 * local
         last = i + 3
         if 3 * local + 3 == count:
@@ -67,12 +73,12 @@ def bezier_points(
         d = points[last]
         return control_points(a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1])
     before = local - 1
-    if closed == 0:
+    if contour.closed == 0:
         before = local
     middle = points[first + (before + 1) % count]
-    share = chain_end(closed == 0 and local == 0)
+    share = chain_end(contour.closed == 0 and local == 0)
     start = share * points[first + (before + count) % count] + (1.0 - share) * middle
-    share = chain_end(closed == 0 and local == count - 3)
+    share = chain_end(contour.closed == 0 and local == count - 3)
     end = share * points[first + (before + 2) % count] + (1.0 - share) * middle
     b = (start + 2.0 * middle) / 3.0
     c = (end + 2.0 * middle) / 3.0
@@ -80,26 +86,20 @@ def bezier_points(
 
 
 @wp.func
-def add_bezier_grad(
-    grad: control_points,
-    closed: wp.int32,
-    basis: wp.int32,
-    first: wp.int32,
-    count: wp.int32,
-    local: wp.int32,
-    points_grad: wp.array[wp.vec2],
-):
+def add_bezier_grad(grad: control_points, contour: Contour, local: wp.int32, points_grad: wp.array[wp.vec2]):
     """Adjoint of ``bezier_points``: add ``grad`` to the contour's control points."""
-    if basis == constants.CUBIC:
+    first = contour.first
+    count = contour.count
+    if contour.basis == constants.CUBIC:
         for j in range(4):
             i = first + (3 * local + j) % count
             points_grad[i] = points_grad[i] + grad[j]
         return
     before = local - 1
-    if closed == 0:
+    if contour.closed == 0:
         before = local
-    start = chain_end(closed == 0 and local == 0) * (grad[0] + grad[1] / 3.0)
-    end = chain_end(closed == 0 and local == count - 3) * (grad[3] + grad[2] / 3.0)
+    start = chain_end(contour.closed == 0 and local == 0) * (grad[0] + grad[1] / 3.0)
+    end = chain_end(contour.closed == 0 and local == count - 3) * (grad[3] + grad[2] / 3.0)
     i = first + (before + count) % count
     points_grad[i] = points_grad[i] + start
     i = first + (before + 1) % count
@@ -109,16 +109,14 @@ def add_bezier_grad(
 
 
 @wp.func
-def point_weight(
-    closed: wp.int32, basis: wp.int32, count: wp.int32, local: wp.int32, j: wp.int32, w: wp.vec4
-) -> wp.float32:
+def point_weight(contour: Contour, local: wp.int32, j: wp.int32, w: wp.vec4) -> wp.float32:
     """Return the weight of control point ``j`` of Bézier ``local`` where its cubic's have the weights ``w``,
     which sum to 1: the adjoint of ``bezier_points``.
     """
-    if basis == constants.CUBIC:
+    if contour.basis == constants.CUBIC:
         return w[j]
-    before = chain_end(closed == 0 and local == 0) * (w[0] + w[1] / 3.0)
-    after = chain_end(closed == 0 and local == count - 3) * (w[3] + w[2] / 3.0)
+    before = chain_end(contour.closed == 0 and local == 0) * (w[0] + w[1] / 3.0)
+    after = chain_end(contour.closed == 0 and local == contour.count - 3) * (w[3] + w[2] / 3.0)
     if j == 0:
         return before
     if j == 2:

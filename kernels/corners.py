@@ -13,6 +13,7 @@ contour's start along the line, so it moves back along its segment by as much as
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import Contour
 from warpsplat.kernels.coverage.stroke import half_width
 from warpsplat.kernels.elementary import angle_of, sine_and_cosine
 from warpsplat.kernels.outline import within_reach
@@ -190,8 +191,8 @@ def corners_backward(
     scale: wp.float32,
     bezier_first: wp.array[wp.int32],  # [shape_count + 1]
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
-    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
-    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
+    contours: wp.array[Contour],  # [contour_count]
+    bezier_range: wp.array[wp.vec2i],  # [bezier_count]
     vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px; of the centre lines
     vertex_next: wp.array[wp.int32],  # [vertex_capacity]
@@ -242,7 +243,7 @@ def corners_backward(
         last = vertices[1]
         bezier = bezier_first[shape + 1]
         while bezier > bezier_first[shape]:
-            bezier = contour_bezier[bezier_contour[bezier - 1]]
-            first = vertices[0] + bezier_vertex[bezier]
+            bezier = contours[bezier_contour[bezier - 1]].bezier
+            first = vertices[0] + bezier_range[bezier][0]
             add_segment_grads(first, last, vertex, vertex_next, segment_grad, start_grad, end_grad)
             last = first

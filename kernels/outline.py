@@ -13,24 +13,16 @@ of what it turns within them: the wider a stroke that has such ends, the more pi
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import bezier_points, control_points, cubic_weights, fair_weights, point_weight
+from warpsplat.kernels.bezier import (
+    Contour,
+    bezier_points,
+    control_points,
+    cubic_weights,
+    fair_weights,
+    point_weight,
+)
 
 wp.set_module_options(constants.MODULE_OPTIONS)
-
-
-@wp.func
-def bezier_of(
-    points: wp.array[wp.vec2],
-    basis: wp.int32,
-    contour: wp.int32,
-    contour_first: wp.array[wp.int32],
-    contour_closed: wp.array[wp.int32],
-    local: wp.int32,
-) -> control_points:
-    """Return Bézier ``local`` of a contour, as a cubic."""
-    first = contour_first[contour]
-    count = contour_first[contour + 1] - first
-    return bezier_points(points, contour_closed[contour], basis, first, count, local)
 
 
 @wp.func
@@ -52,14 +44,11 @@ def plan_outline(
     basis: wp.array[wp.int32],  # [shape_count] CUBIC or SPLINE
     bezier_first: wp.array[wp.int32],  # [shape_count + 1] first Bézier of each shape
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
-    contour_first: wp.array[wp.int32],  # [contour_count + 1] first control point
-    contour_bezier: wp.array[wp.int32],  # [contour_count + 1] first Bézier of each contour
-    contour_closed: wp.array[wp.int32],  # [contour_count]
+    contours: wp.array[Contour],  # [contour_count]
     scale: wp.float32,  # render pixels per canvas unit
     slack: wp.float32,  # over FLATNESS
     # Out:
-    bezier_vertex: wp.array[wp.int32],  # [bezier_count] first vertex of each Bézier, counted in its shape
-    bezier_pieces: wp.array[wp.int32],  # [bezier_count] straight pieces
+    bezier_range: wp.array[wp.vec2i],  # [bezier_count] its straight pieces, counted in its shape's vertices
     vertex_count: wp.array[wp.int32],  # [shape_count] an open contour has one more than pieces
 ):
     """Choose the number of pieces of each Bézier: the polyline is at most slack x FLATNESS px off it. One
@@ -75,23 +64,22 @@ def plan_outline(
         least = constants.PIECES_MIN_SPLINE
     vertices = int(0)
     for bezier in range(bezier_first[shape], bezier_first[shape + 1]):
-        contour = bezier_contour[bezier]
-        local = bezier - contour_bezier[contour]
-        p = bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
+        contour = contours[bezier_contour[bezier]]
+        local = bezier - contour.bezier
+        p = bezier_points(points, contour, local)
         worst = wp.max(wp.length(p[0] - 2.0 * p[1] + p[2]), wp.length(p[1] - 2.0 * p[2] + p[3]))
         wanted = wp.ceil(wp.sqrt(0.5 * scale * worst / flatness))
-        is_end = local == 0 or bezier + 1 == contour_bezier[contour + 1]
+        is_last = local + 1 == contour.beziers
         # Splines are smooth but for the ends of open ones.
         if part[shape] == constants.STYLED and (
-            basis[shape] == constants.CUBIC or (is_end and contour_closed[contour] == 0)
+            basis[shape] == constants.CUBIC or ((local == 0 or is_last) and contour.closed == 0)
         ):
             slant = wp.max(turn_rate(p[1] - p[0], p[2] - p[1]), turn_rate(p[3] - p[2], p[2] - p[1]))
             wanted = wp.max(wanted, 0.25 * scale * widths[shape] * slant / (constants.SLANT * slack))
         pieces = wp.clamp(int(wp.min(wp.ceil(wanted), 1.0e6)), least, constants.PIECES_MAX)
-        bezier_vertex[bezier] = vertices
-        bezier_pieces[bezier] = pieces
+        bezier_range[bezier] = wp.vec2i(vertices, vertices + pieces)
         vertices += pieces
-        if contour_closed[contour] == 0 and bezier + 1 == contour_bezier[contour + 1]:
+        if is_last and contour.closed == 0:
             vertices += 1
     vertex_count[shape] = vertices
 
@@ -117,16 +105,11 @@ def outline_forward(
     points: wp.array[wp.vec2],  # [point_count] canvas units
     widths: wp.array[wp.float32],  # [shape_count] canvas units; not read for fills
     kind: wp.array[wp.int32],  # [shape_count]
-    basis: wp.array[wp.int32],  # [shape_count]
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
-    contour_shape: wp.array[wp.int32],  # [contour_count]
-    contour_first: wp.array[wp.int32],  # [contour_count + 1]
-    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
-    contour_closed: wp.array[wp.int32],  # [contour_count]
+    contours: wp.array[Contour],  # [contour_count]
     scale: wp.float32,
     vertex_range: wp.array[wp.vec2i],  # [shape_count]
-    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
-    bezier_pieces: wp.array[wp.int32],  # [bezier_count]
+    bezier_range: wp.array[wp.vec2i],  # [bezier_count]
     # Out:
     vertex_shape: wp.array[wp.int32],  # [vertex_capacity] those beyond the last shape's are left as they are
     vertex_next: wp.array[wp.int32],  # [vertex_capacity] where the edge that starts here ends; NONE: no edge
@@ -137,17 +120,18 @@ def outline_forward(
     open contour. One thread a Bézier.
     """
     bezier = offset + wp.tid()
-    contour = bezier_contour[bezier]
-    shape = contour_shape[contour]
+    contour = contours[bezier_contour[bezier]]
+    shape = contour.shape
     vertices = vertex_range[shape]
     if vertices[1] == vertices[0]:
         return
-    closed = contour_closed[contour] != 0
-    local = bezier - contour_bezier[contour]
-    is_last = bezier + 1 == contour_bezier[contour + 1]
-    p = scale * bezier_of(points, basis[shape], contour, contour_first, contour_closed, local)
-    base = vertices[0] + bezier_vertex[bezier]
-    pieces = bezier_pieces[bezier]
+    closed = contour.closed != 0
+    local = bezier - contour.bezier
+    is_last = local + 1 == contour.beziers
+    p = scale * bezier_points(points, contour, local)
+    own = bezier_range[bezier]
+    base = vertices[0] + own[0]
+    pieces = own[1] - own[0]
     count = pieces
     if is_last and not closed:
         count += 1
@@ -162,16 +146,16 @@ def outline_forward(
         elif k == 0:
             before = local - 1
             if local == 0:
-                before = contour_bezier[contour + 1] - contour_bezier[contour] - 1
-            q = scale * bezier_of(points, basis[shape], contour, contour_first, contour_closed, before)
-            before_pieces = bezier_pieces[contour_bezier[contour] + before]
-            position = 0.5 * (position + weighted(q, fair_weights(1.0, before_pieces)))
+                before = contour.beziers - 1
+            q = scale * bezier_points(points, contour, before)
+            other = bezier_range[contour.bezier + before]
+            position = 0.5 * (position + weighted(q, fair_weights(1.0, other[1] - other[0])))
         vertex_shape[base + k] = shape
         vertex_next[base + k] = base + k + 1
         vertex[base + k] = wp.vec2(within_reach(position[0]), within_reach(position[1]))
         extent[base + k] = wp.vec2(reach, reach)
     if is_last:
-        start = vertices[0] + bezier_vertex[contour_bezier[contour]]
+        start = vertices[0] + bezier_range[contour.bezier][0]
         if not closed and kind[shape] != constants.FILL:
             start = constants.NONE
         vertex_next[base + count - 1] = start
@@ -181,16 +165,11 @@ def outline_forward(
 def outline_backward(
     # In:
     offset: wp.int32,
-    basis: wp.array[wp.int32],  # [shape_count]
     point_contour: wp.array[wp.int32],  # [point_count]
-    contour_shape: wp.array[wp.int32],  # [contour_count]
-    contour_first: wp.array[wp.int32],  # [contour_count + 1]
-    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
-    contour_closed: wp.array[wp.int32],  # [contour_count]
+    contours: wp.array[Contour],  # [contour_count]
     scale: wp.float32,
     vertex_range: wp.array[wp.vec2i],  # [shape_count]
-    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
-    bezier_pieces: wp.array[wp.int32],  # [bezier_count]
+    bezier_range: wp.array[wp.vec2i],  # [bezier_count]
     start_grad: wp.array[wp.vec2],  # [vertex_capacity] of the first end of the edge that starts at a vertex
     end_grad: wp.array[wp.vec2],  # [vertex_capacity] of the second end of that edge; 0 where there is none
     # Out:
@@ -198,26 +177,22 @@ def outline_backward(
 ):
     """A gather, one thread a control point: its weights in its Béziers x the gradients of their vertices."""
     point = offset + wp.tid()
-    contour = point_contour[point]
-    shape = contour_shape[contour]
+    contour = contours[point_contour[point]]
     total = wp.vec2(0.0, 0.0)
-    vertices = vertex_range[shape]
+    vertices = vertex_range[contour.shape]
     if vertices[1] > vertices[0]:
-        closed = contour_closed[contour]
-        index = point - contour_first[contour]
-        count = contour_first[contour + 1] - contour_first[contour]
-        bezier_base = contour_bezier[contour]
-        beziers = contour_bezier[contour + 1] - bezier_base
-        first = vertices[0] + bezier_vertex[bezier_base]
+        closed = contour.closed
+        beziers = contour.beziers
+        index = point - contour.first
+        first = vertices[0] + bezier_range[contour.bezier][0]
         # The vertex before the first, by way of the edge that closes the contour.
-        last = vertices[0] + bezier_vertex[bezier_base + beziers - 1]
-        last += bezier_pieces[bezier_base + beziers - 1] - closed
+        last = vertices[0] + bezier_range[contour.bezier + beziers - 1][1] - closed
         # The last Bézier that the point belongs to, which number it has there, and how those change for the
         # Béziers before: the point may end a cubic, and belongs to three quadratics.
         latest = index / 3
         j = index % 3
         step = int(3)
-        if basis[shape] != constants.CUBIC:
+        if contour.basis != constants.CUBIC:
             latest = index + closed
             j = int(0)
             step = 1
@@ -226,10 +201,10 @@ def outline_backward(
             if closed != 0:
                 local = (latest + beziers) % beziers
             if local >= 0 and local < beziers:
-                base = vertices[0] + bezier_vertex[bezier_base + local]
-                pieces = bezier_pieces[bezier_base + local]
+                own = bezier_range[contour.bezier + local]
+                pieces = own[1] - own[0]
                 for k in range(pieces + 1):
-                    v = base + k
+                    v = vertices[0] + own[0] + k
                     if v > last:
                         v = first
                     before = v - 1
@@ -243,9 +218,8 @@ def outline_backward(
                         if closed == 0 and (v == first or v == last):  # noqa: PLR1714, SIM109
                             w = cubic_weights(t)
                             share = 1.0
-                    total += (share * point_weight(closed, basis[shape], count, local, j, w)) * (
-                        start_grad[v] + end_grad[before]
-                    )
+                    weight = share * point_weight(contour, local, j, w)
+                    total += weight * (start_grad[v] + end_grad[before])
             latest -= 1
             j += step
     points_grad[point] = scale * total

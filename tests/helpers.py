@@ -55,7 +55,8 @@ def outline_of(renderer: Renderer) -> OutlineBuffers:
 
 def pieces_of(renderer: Renderer) -> list[list[int]]:
     """Return the number of pieces of each Bézier, by shape."""
-    pieces = outline_of(renderer).bezier_pieces.numpy().tolist()
+    ranges = outline_of(renderer).bezier_range.numpy()
+    pieces = (ranges[:, 1] - ranges[:, 0]).tolist()
     first = renderer.parameters.arrays["bezier_first"].numpy()
     return [pieces[a:b] for a, b in itertools.pairwise(first)]
 

@@ -3,7 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
-from warpsplat.kernels.bezier import add_bezier_grad, bezier_points, control_points, cross
+from warpsplat.kernels.bezier import Contour, add_bezier_grad, bezier_points, control_points, cross
 
 wp.set_module_options(constants.MODULE_OPTIONS)
 
@@ -77,31 +77,25 @@ def make_backward(name: str, loss: wp.Function, *, mean: bool) -> wp.Kernel:
         # In:
         offset: wp.int32,
         points: wp.array[wp.vec2],  # [point_count] canvas units
-        basis: wp.array[wp.int32],  # [shape_count]
-        contour_shape: wp.array[wp.int32],  # [contour_count]
-        contour_first: wp.array[wp.int32],  # [contour_count + 1]
-        contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
-        contour_closed: wp.array[wp.int32],  # [contour_count]
+        contours: wp.array[Contour],  # [contour_count]
         weight: wp.float32,
         # Out:
         points_grad: wp.array[wp.vec2],  # [point_count] added to
         contour_loss: wp.array[wp.float32],  # [contour_count] sum over its Béziers, before weight and mean
     ):
         """One thread a contour."""
-        contour = offset + wp.tid()
-        own_basis = basis[contour_shape[contour]]
-        closed = contour_closed[contour]
-        first = contour_first[contour]
-        count = contour_first[contour + 1] - first
+        i = offset + wp.tid()
+        contour = contours[i]
         factor = weight
         if mean:
-            factor = weight / float(contour_bezier[contour_bezier.shape[0] - 1])
+            last = contours[contours.shape[0] - 1]
+            factor = weight / float(last.bezier + last.beziers)
         total = float(0.0)
-        for local in range(contour_bezier[contour + 1] - contour_bezier[contour]):
-            value, grad = loss(bezier_points(points, closed, own_basis, first, count, local), factor)
+        for local in range(contour.beziers):
+            value, grad = loss(bezier_points(points, contour, local), factor)
             total += value
-            add_bezier_grad(grad, closed, own_basis, first, count, local, points_grad)
-        contour_loss[contour] = total
+            add_bezier_grad(grad, contour, local, points_grad)
+        contour_loss[i] = total
 
     return backward
 

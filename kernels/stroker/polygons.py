@@ -27,12 +27,13 @@ class Polygons:
 
 @wp.struct
 class Style:
-    """Width, caps and joins of a stroke."""
+    """Width, caps, joins and dashes of a stroke."""
 
-    half: wp.float32  # of its width [px]
+    half: wp.float32  # of its width [px]; only known where the stroke is drawn
     cap: wp.int32
     join: wp.int32
     miter_limit: wp.float32
+    dash: wp.int32  # row of the patterns, or NONE
 
 
 @wp.func

@@ -3,6 +3,7 @@
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import Contour
 from warpsplat.kernels.corners import miter_ratio, segment_direction, turn_between
 from warpsplat.kernels.coverage.stroke import half_width
 from warpsplat.kernels.stroker.caps import put_cap, put_dot
@@ -156,11 +157,9 @@ def walk_segment(
 @wp.func
 def walk_contour(
     at: wp.int32,
-    closed: wp.int32,
+    contour: Contour,
     base: wp.int32,
-    beziers: wp.vec2i,
-    bezier_vertex: wp.array[wp.int32],
-    bezier_pieces: wp.array[wp.int32],
+    bezier_range: wp.array[wp.vec2i],
     line: Line,
     style: Style,
     pattern: Pattern,
@@ -168,10 +167,11 @@ def walk_contour(
 ) -> wp.int32:
     """Add the polygons of a contour; return the number of the next corner.
 
-    ``base``: first vertex of the shape; ``beziers``: the contour's, [first, last). A dash that goes on over
-    the start of a closed contour is one dash, drawn at the end; one that is all of the contour has two ends,
-    as in viewers.
+    ``base``: first vertex of the shape. A dash that goes on over the start of a closed contour is one dash,
+    drawn at the end; one that is all of the contour has two ends, as in viewers.
     """
+    first_bezier = contour.bezier
+    last_bezier = contour.bezier + contour.beziers
     w = Walk()
     w.corner = at
     w.corner_limit = at + constants.CORNERS_MAX
@@ -181,9 +181,9 @@ def walk_contour(
     w.ends = wp.vec2(0.0, 1.0)
     w.untouched = 1
     total = float(0.0)
-    for bezier in range(beziers[0], beziers[1]):
-        for k in range(bezier_pieces[bezier]):
-            i = base + bezier_vertex[bezier] + k
+    for bezier in range(first_bezier, last_bezier):
+        for k in range(bezier_range[bezier][0], bezier_range[bezier][1]):
+            i = base + k
             length = wp.length(line.vertex[line.next[i]] - line.vertex[i])
             if length >= constants.SEGMENT_MIN:
                 total += length
@@ -191,13 +191,13 @@ def walk_contour(
                 w.length = length
     if w.segment == constants.NONE:
         if pattern.stretch == 0.0:
-            return put_dot(at, base + bezier_vertex[beziers[0]], 0.0, style, out)
+            return put_dot(at, base + bezier_range[first_bezier][0], 0.0, style, out)
         return at
     # A ring starts with its last segment pending: nothing but the join to the first is drawn of that.
     w.direction = segment_direction(line.vertex, line.next, w.segment)
     w.dash_left = 2.0 * total + 1.0
     laps = int(1)
-    if closed != 0 and pattern.stretch == 0.0:
+    if contour.closed != 0 and pattern.stretch == 0.0:
         w.ring = 1
     else:
         w.segment = constants.NONE
@@ -205,7 +205,7 @@ def walk_contour(
         begin = dash_at(pattern, 0.0)
         w.dash = int(begin[0])
         w.dash_left = begin[1]
-        if closed != 0 and w.dash % 2 == 0 and w.dash_left < total:
+        if contour.closed != 0 and w.dash % 2 == 0 and w.dash_left < total:
             if int(dash_at(pattern, total)[0]) % 2 == 0:
                 laps = 2
                 w.postponed = 1
@@ -215,10 +215,10 @@ def walk_contour(
         if lap == 1:
             w.dash = first_dash
             w.dash_left = first_left
-        for bezier in range(beziers[0], beziers[1]):
+        for bezier in range(first_bezier, last_bezier):
             w.between_beziers = 1
-            for k in range(bezier_pieces[bezier]):
-                w = walk_segment(w, base + bezier_vertex[bezier] + k, lap, line, style, pattern, out)
+            for k in range(bezier_range[bezier][0], bezier_range[bezier][1]):
+                w = walk_segment(w, base + k, lap, line, style, pattern, out)
     if w.segment == constants.NONE:
         return w.corner
     if w.ring != 0:
@@ -237,18 +237,13 @@ def walk_strokes(
     part: wp.array[wp.int32],  # [shape_count]
     widths: wp.array[wp.float32],  # [shape_count] canvas units
     scale: wp.float32,
-    cap: wp.array[wp.int32],  # [shape_count]
-    join: wp.array[wp.int32],  # [shape_count]
-    miter_limits: wp.array[wp.float32],  # [shape_count]
-    dash: wp.array[wp.int32],  # [shape_count] row of the patterns, or NONE
+    styles: wp.array[Style],  # [shape_count]
     dash_first: wp.array[wp.int32],  # [patterns + 1] first number of each
     dashes: wp.array[wp.float32],  # [numbers] canvas units: where it begins, dash, gap, dash, gap ...
     bezier_first: wp.array[wp.int32],  # [shape_count + 1]
     bezier_contour: wp.array[wp.int32],  # [bezier_count]
-    contour_bezier: wp.array[wp.int32],  # [contour_count + 1]
-    contour_closed: wp.array[wp.int32],  # [contour_count]
-    bezier_vertex: wp.array[wp.int32],  # [bezier_count]
-    bezier_pieces: wp.array[wp.int32],  # [bezier_count]
+    contours: wp.array[Contour],  # [contour_count]
+    bezier_range: wp.array[wp.vec2i],  # [bezier_count]
     vertex_range: wp.array[wp.vec2i],  # [shape_count]
     vertex: wp.array[wp.vec2],  # [vertex_capacity] px; of the centre lines
     vertex_next: wp.array[wp.int32],  # [vertex_capacity]
@@ -267,11 +262,8 @@ def walk_strokes(
     vertices = vertex_range[shape]
     if part[shape] != constants.STYLED or vertices[1] == vertices[0]:
         return
-    style = Style()
+    style = styles[shape]
     style.half = half_width(widths[shape], scale)
-    style.cap = cap[shape]
-    style.join = join[shape]
-    style.miter_limit = miter_limits[shape]
     first = int(0)
     if write != 0:
         first = corner_range[shape][0]
@@ -289,24 +281,12 @@ def walk_strokes(
     line.vertex = vertex
     line.next = vertex_next
     line.extent = extent
-    pattern = pattern_of(dash[shape], dash_first, dashes, scale)
+    pattern = pattern_of(style.dash, dash_first, dashes, scale)
     n = int(first)
     bezier = bezier_first[shape]
     while bezier < bezier_first[shape + 1] and n - first <= constants.CORNERS_MAX:
-        contour = bezier_contour[bezier]
-        beziers = wp.vec2i(bezier, contour_bezier[contour + 1])
-        n = walk_contour(
-            n,
-            contour_closed[contour],
-            vertices[0],
-            beziers,
-            bezier_vertex,
-            bezier_pieces,
-            line,
-            style,
-            pattern,
-            out,
-        )
-        bezier = beziers[1]
+        contour = contours[bezier_contour[bezier]]
+        n = walk_contour(n, contour, vertices[0], bezier_range, line, style, pattern, out)
+        bezier += contour.beziers
     if write == 0:
         corner_count[shape] = n

@@ -196,9 +196,10 @@ class Measure:
     def _pieces(self) -> tuple[Links, Links, Links]:
         """Return the cubic, and the first and second vertex, of the straight pieces."""
         b, arrays = self._outline, self._parameters.arrays
-        counts = b.bezier_pieces.numpy().astype(np.intp)
-        shape = arrays["contour_shape"].numpy()[arrays["bezier_contour"].numpy()]
-        base = b.vertex_range.numpy()[shape, 0] + b.bezier_vertex.numpy()
+        pieces = b.bezier_range.numpy().astype(np.intp)
+        counts = pieces[:, 1] - pieces[:, 0]
+        shape = arrays["contours"].numpy()["shape"][arrays["bezier_contour"].numpy()]
+        base = b.vertex_range.numpy()[shape, 0] + pieces[:, 0]
         cubic = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(cubic)) - np.repeat(np.cumsum(counts) - counts, counts)
         vertex = base[cubic] + number

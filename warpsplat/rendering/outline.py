@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 class OutlineBuffers:
     """Arrays that the stage owns."""
 
-    bezier_vertex: wp.array = buffer(wp.int32, "beziers")
-    """First vertex of each Bézier, counted in its shape."""
-    bezier_pieces: wp.array = buffer(wp.int32, "beziers")
-    """Straight pieces of each Bézier."""
+    bezier_range: wp.array = buffer(wp.vec2i, "beziers")
+    """The straight pieces of each Bézier, counted in its shape's vertices."""
     vertex_count: wp.array = buffer(wp.int32, "shapes")
     vertex_ends: wp.array = buffer(wp.int32, "shapes")
     vertex_range: wp.array = buffer(wp.vec2i, "shapes")

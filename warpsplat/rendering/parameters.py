@@ -10,6 +10,7 @@ import numpy.typing as npt
 import warp as wp
 
 from warpsplat.kernels import constants
+from warpsplat.kernels.bezier import Contour
 from warpsplat.kernels.constants import NONE
 from warpsplat.kernels.paint.gradient import frame
 from warpsplat.rendering.backend import Backend, view
@@ -77,8 +78,8 @@ class Parameters:
         scene = values.drawn()
         shapes = np.arange(len(scene))
         owner = scene.contour_shapes()
-        contours = np.arange(len(owner))
         in_contour, in_shape = scene.contour_beziers(), scene.bezier_counts()
+        contours = np.arange(len(owner))
         self.shape_count, self.point_count = len(scene), len(scene.points)
         self.contour_count, self.bezier_count = len(owner), int(in_shape.sum())
         self.arrays: dict[str, wp.array] = {
@@ -93,10 +94,16 @@ class Parameters:
             "point_first": self._ints(scene.first),
             "point_shape": self._ints(np.repeat(shapes, scene.point_counts())),
             "point_contour": self._ints(np.repeat(contours, np.diff(scene.starts))),
-            "contour_shape": self._ints(owner),
-            "contour_first": self._ints(scene.starts),
-            "contour_closed": self._ints(scene.closed),
-            "contour_bezier": self._ints(starts_of(in_contour)),
+            "contours": self._structs(
+                Contour,
+                shape=owner,
+                basis=scene.basis[owner],
+                closed=scene.closed,
+                first=scene.starts[:-1],
+                count=np.diff(scene.starts),
+                bezier=starts_of(in_contour)[:-1],
+                beziers=in_contour,
+            ),
             "bezier_first": self._ints(starts_of(in_shape)),
             "bezier_contour": self._ints(np.repeat(contours, in_contour)),
             "ages": self._ints(ages),
@@ -169,19 +176,26 @@ class Parameters:
         return part
 
     def _upload_styles(self, scene: Scene) -> None:
+        from warpsplat.kernels.stroker.polygons import Style  # which few scenes need
+
         lengths = np.array([len(pattern) for pattern in scene.dashes], np.int32)
         numbers = np.array([x for pattern in scene.dashes for x in pattern], np.float32)
         self.arrays |= {
-            "cap": self._ints(scene.cap),
-            "join": self._ints(scene.join),
-            "miter_limits": wp.array(scene.miter_limits, dtype=wp.float32, device=self.backend.device),
-            "dash": self._ints(scene.dash),
+            "styles": self._structs(
+                Style, cap=scene.cap, join=scene.join, miter_limit=scene.miter_limits, dash=scene.dash
+            ),
             "dash_first": self._ints(starts_of(lengths)),
             "dashes": wp.array(numbers, dtype=wp.float32, device=self.backend.device),
         }
 
     def _ints(self, values: np.ndarray) -> wp.array:
         return wp.array(np.ascontiguousarray(values, np.int32), dtype=wp.int32, device=self.backend.device)
+
+    def _structs(self, kind: Any, **columns: np.ndarray) -> wp.array:
+        rows = np.zeros(len(next(iter(columns.values()))), kind.numpy_dtype())
+        for name, values in columns.items():
+            rows[name] = values
+        return wp.array(rows, dtype=kind, device=self.backend.device)
 
     def _floats(self, values: FloatArray, attribute: Attribute) -> wp.array:
         flat = np.ascontiguousarray(values, np.float32).reshape(-1, attribute.size)
