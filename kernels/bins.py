@@ -93,62 +93,21 @@ def fill_slots(
 
 
 @wp.kernel
-def clear_ranges(
-    # In:
-    offset: wp.int32,
-    # Out:
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_last: wp.array[wp.int32],  # [tile_count]
-):
-    """Give every tile an empty range, which tiles that nothing reaches keep."""
-    tile = offset + wp.tid()
-    tile_first[tile] = 0
-    tile_last[tile] = 0
-
-
-@wp.kernel
-def tile_ranges(
-    # In:
-    offset: wp.int32,
-    sort_keys: wp.array[wp.int32],  # [2 x slot_capacity] sorted
-    slot_capacity: wp.int32,
-    # Out:
-    tile_first: wp.array[wp.int32],  # [tile_count] range of each tile in the sorted list
-    tile_last: wp.array[wp.int32],  # [tile_count]
-):
-    """Write the end of one tile's range and the start of the next at each border between two keys."""
-    i = offset + wp.tid()
-    tile = sort_keys[i]
-    if tile == constants.INT_MAX:
-        return
-    before = int(-1)
-    if i > 0:
-        before = sort_keys[i - 1]
-    after = int(constants.INT_MAX)
-    if i + 1 < slot_capacity:
-        after = sort_keys[i + 1]
-    if before != tile:
-        tile_first[tile] = i
-    if after != tile:
-        tile_last[tile] = i + 1
-
-
-@wp.kernel
 def list_visible(
     # In:
     offset: wp.int32,
+    sort_keys: wp.array[wp.int32],  # [2 x slot_capacity] tiles of slots, sorted
     sort_slots: wp.array[wp.int32],  # [2 x slot_capacity] slots by tile, front to back
+    slot_capacity: wp.int32,
     slot_shape: wp.array[wp.int32],  # [slot_capacity]
     paint: wp.array[wp.int32],  # [shape_count]
     colors: wp.array[wp.vec3],  # [shape_count]
     opacities: wp.array[wp.float32],  # [shape_count]
-    tile_first: wp.array[wp.int32],  # [tile_count]
-    tile_last: wp.array[wp.int32],  # [tile_count]
     opacity_limit: wp.float32,  # below 1, lists go on behind opaque shapes, which count as less opaque
     keeps_colors: wp.int32,  # 1 where no gradient of colours and opacities is asked for
     # Out:
     slot_state: wp.array[wp.int32],  # [slot_capacity] HIDDEN added
-    tile_stop: wp.array[wp.int32],  # [tile_count] end of the tile's range in the two lists
+    tile_range: wp.array[wp.vec2i],  # [tile_count] of the two lists
     list_slot: wp.array[wp.int32],  # [slot_capacity] slot, or -1 - slot of a FULL one
     list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity
     tile_shapes: wp.array[wp.int32],  # [tile_count] hash of a cacheable tile's shapes
@@ -159,10 +118,12 @@ def list_visible(
     """
     tile = offset + wp.tid()
     transmittance = float(1.0)
-    n = tile_first[tile]
+    start = find_range(sort_keys, slot_capacity, tile - 1)
+    n = int(start)
     shapes = int(1)
     is_cacheable = keeps_colors
-    for k in range(tile_first[tile], tile_last[tile]):
+    k = int(start)
+    while k < slot_capacity and sort_keys[k] == tile:
         slot = sort_slots[k]
         state = slot_state[slot]
         if transmittance <= constants.TRANSMITTANCE_MIN:
@@ -179,7 +140,8 @@ def list_visible(
             if state != constants.FULL or paint[shape] != constants.FLAT:
                 is_cacheable = 0
             n += 1
-    tile_stop[tile] = n
+        k += 1
+    tile_range[tile] = wp.vec2i(start, n)
     cache = int(0)
     if is_cacheable == 1:
         cache = wp.where(shapes == tile_shapes[tile], constants.CACHED, constants.CACHEABLE)

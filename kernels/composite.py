@@ -50,8 +50,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
         # In:
         offset: wp.int32,
         lane_columns: wp.int32,  # columns of a tile that a thread handles
-        tile_first: wp.array[wp.int32],  # [tile_count]
-        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_range: wp.array[wp.vec2i],  # [tile_count]
         tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
@@ -68,8 +67,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
         if skips_cached:
             if tile_cache[tile] == constants.CACHED:
                 return
-        start = tile_first[tile]
-        stop = tile_stop[tile]
+        visible = tile_range[tile]
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
             transmittance = column(1.0)
             red = column(0.0)
@@ -78,7 +76,7 @@ def make_forward(column: Any, *, painted: bool, straight: bool = False) -> wp.Ke
             if straight:
                 touched = column(0.0)
                 seen = column(0.0)
-            for k in range(start, stop):
+            for k in range(visible[0], visible[1]):
                 paint = list_paint[k]
                 slot = list_slot[k]
                 if straight:
@@ -139,8 +137,7 @@ def make_removal_cost(column: Any) -> wp.Kernel:
         # In:
         offset: wp.int32,
         lane_columns: wp.int32,
-        tile_first: wp.array[wp.int32],  # [tile_count]
-        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_range: wp.array[wp.vec2i],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity]
         list_paint: wp.array[wp.vec4],  # [slot_capacity]
         coverage: wp.array2d[column],  # [slot_capacity, columns]
@@ -159,6 +156,7 @@ def make_removal_cost(column: Any) -> wp.Kernel:
         """
         i, lane = wp.tid()
         tile = offset + i
+        visible = tile_range[tile]
         one = column(1.0)
         zero = column(0.0)
         planes = image.shape[1]
@@ -175,7 +173,7 @@ def make_removal_cost(column: Any) -> wp.Kernel:
             if planes == 4:
                 opaque = image[tile, 3, x]
                 opaque_error = 2.0 * (opaque - target[tile, 3, x])
-            for k in range(tile_first[tile], tile_stop[tile]):
+            for k in range(visible[0], visible[1]):
                 paint = list_paint[k]
                 slot = list_slot[k]
                 seen = wp.abs(paint[3]) * transmittance
@@ -228,8 +226,7 @@ def make_visibility(column: Any) -> wp.Kernel:
         # In:
         offset: wp.int32,
         lane_columns: wp.int32,  # columns of a tile that a thread handles
-        tile_first: wp.array[wp.int32],  # [tile_count]
-        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_range: wp.array[wp.vec2i],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] opacity last, negative of gradients
         coverage: wp.array2d[column],  # [slot_capacity, columns]
@@ -242,9 +239,10 @@ def make_visibility(column: Any) -> wp.Kernel:
         """
         i, lane = wp.tid()
         tile = offset + i
+        visible = tile_range[tile]
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
             transmittance = column(1.0)
-            for k in range(tile_first[tile], tile_stop[tile]):
+            for k in range(visible[0], visible[1]):
                 opacity = list_paint[k][3]
                 slot = list_slot[k]
                 share = wp.abs(opacity) * transmittance

@@ -47,8 +47,7 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
         # In:
         offset: wp.int32,
         lane_columns: wp.int32,  # columns of a tile that a thread handles
-        tile_first: wp.array[wp.int32],  # [tile_count]
-        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_range: wp.array[wp.vec2i],  # [tile_count]
         tile_cache: wp.array[wp.int32],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity]
         list_paint: wp.array[wp.vec4],  # [slot_capacity]
@@ -69,8 +68,7 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
         tile = offset + i
         if tile_cache[tile] != 0:
             return
-        start = tile_first[tile]
-        stop = tile_stop[tile]
+        visible = tile_range[tile]
         one = column(1.0)
         zero = column(0.0)
         least = column(TINY)
@@ -87,7 +85,7 @@ def make_backward(column: Any, *, painted: bool) -> wp.Kernel:
                     opaque = image_grad[tile, 3, x]
                     behind = behind + wp.cw_mul(image[tile, 3, x], opaque)
             transmittance = one
-            for k in range(start, stop):
+            for k in range(visible[0], visible[1]):
                 paint = list_paint[k]
                 slot = list_slot[k]
                 full = slot < 0

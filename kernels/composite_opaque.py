@@ -68,8 +68,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
         # In:
         offset: wp.int32,
         lane_columns: wp.int32,  # columns of a tile that a thread handles
-        tile_first: wp.array[wp.int32],  # [tile_count]
-        tile_stop: wp.array[wp.int32],  # [tile_count]
+        tile_range: wp.array[wp.vec2i],  # [tile_count]
         list_slot: wp.array[wp.int32],  # [slot_capacity] front to back, -1 - slot where FULL
         list_paint: wp.array[wp.vec4],  # [slot_capacity] colour and opacity; negative: see paint_columns
         coverage: wp.array2d[column],  # [slot_capacity, columns]
@@ -88,8 +87,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
         """One thread a tile and lane."""
         i, lane = wp.tid()
         tile = offset + i
-        start = tile_first[tile]
-        stop = tile_stop[tile]
+        visible = tile_range[tile]
         one = column(1.0)
         zero = column(0.0)
         for x in range(lane * lane_columns, (lane + 1) * lane_columns):
@@ -106,7 +104,7 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                         opaque = image_grad[tile, 3, x]
                 behind = background[0] * red + background[1] * green + background[2] * blue
             transmittance = one
-            for k in range(start, stop):
+            for k in range(visible[0], visible[1]):
                 transmittances[k, lane] = transmittance
                 opacity = list_paint[k][3]
                 slot = list_slot[k]
@@ -124,8 +122,8 @@ def make_backward(column: Any, *, painted: bool, straight: bool = False) -> wp.K
                 red = wp.cw_mul(red, factor)
                 green = wp.cw_mul(green, factor)
                 blue = wp.cw_mul(blue, factor)
-            for n in range(start, stop):
-                k = start + stop - 1 - n
+            for n in range(visible[0], visible[1]):
+                k = visible[0] + visible[1] - 1 - n
                 paint = list_paint[k]
                 slot = list_slot[k]
                 full = slot < 0

@@ -32,10 +32,8 @@ class BinBuffers:
     sort_keys: wp.array = buffer(wp.int32, "sorted")
     """The second half of both is the sort's scratch memory."""
     sort_slots: wp.array = buffer(wp.int32, "sorted")
-    tile_first: wp.array = buffer(wp.int32, "tiles")
-    tile_last: wp.array = buffer(wp.int32, "tiles")
-    tile_stop: wp.array = buffer(wp.int32, "tiles")
-    """End of a tile's visible slots in the two lists."""
+    tile_range: wp.array = buffer(wp.vec2i, "tiles")
+    """A tile's visible slots in the two lists: the first, and one past the last."""
     tile_shapes: wp.array = buffer(wp.int32, "tiles")
     tile_cache: wp.array = buffer(wp.int32, "tiles")
     """0, ``constants.CACHEABLE`` or ``CACHED``."""
@@ -71,16 +69,15 @@ class Bins:
         self.buffers = backend.allocate(BinBuffers, sizes)
 
     def forward(self, program: Program, samples: dict[str, Any]) -> None:
-        """Record samples -> slots, and each tile's range of them."""
-        b, shapes, tiles = self.buffers, self._parameters.shape_count, self._viewport.tile_count
+        """Record samples -> slots, sorted by tile."""
+        b, shapes = self.buffers, self._parameters.shape_count
         program.launch(bins.rectangles, shapes, b, samples, self._viewport, split=True)
         ranges = (b.front_slots, b.front_ends, b.slot_range)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity, reverse=True)
         program.launch(bins.fill_slots, self._capacity, b, self._viewport, split=True)
-        bits = tiles.bit_length()  # in which the keys of unused slots, INT_MAX, are still the largest
+        # The keys of unused slots, INT_MAX, are still the largest in these bits.
+        bits = self._viewport.tile_count.bit_length()
         program.call(wp.utils.radix_sort_pairs, b.sort_keys, b.sort_slots, self._capacity, 0, bits)
-        program.launch(bins.clear_ranges, tiles, b)
-        program.launch(bins.tile_ranges, self._capacity, b, slot_capacity=self._capacity)
 
     def list_visible(self, program: Program) -> None:
         """Record states of slots -> each tile's list of those that are seen."""
@@ -89,6 +86,7 @@ class Bins:
             self._viewport.tile_count,
             self.buffers,
             self._parameters.arrays,
+            slot_capacity=self._capacity,
             opacity_limit=self._opacity_limit,
             keeps_colors=int(self._parameters.keeps_colors),
             split=True,
