@@ -101,11 +101,15 @@ class Grid:
             "soft": inputs.samples if softness else 0,
         }
         self.buffers = inputs.backend.allocate(GridBuffers, sizes)
-        self._sources = (self.buffers, p.arrays, inputs.viewport)
-        self._scales = {
+        self._plan_scale = 1.0 if softness else inputs.viewport.scale
+        options = {
+            "soft": int(softness is not None),
+            "density": softness.density if softness else 1.0,
+            "softness": softness.sigma if softness else 0.0,
             "through_scales": float(through_scales),
             "fold_factor": fold / inputs.viewport.pixel_count,
         }
+        self._sources = (self.buffers, p.arrays, inputs.viewport, options)
         kernels = {Kind.FILL: FILLS, Kind.STROKE: ROWS if softness else STROKES}
         self._kernels = [kernels[kind] for kind in sorted(p.kinds)]
 
@@ -120,28 +124,18 @@ class Grid:
     def forward(self, program: Program) -> None:
         """Record points, widths -> Gaussians; soft ones have opacities of their own."""
         b, shapes = self.buffers, self._parameters.shape_count
-        if self.softness:
-            size = {"soft": 1, "density": self.softness.density, "scale": 1.0}
-        else:
-            size = {"soft": 0, "density": 1.0}
-        self._launch(program, plan.plan_grid, shapes, **size)
+        self._launch(program, plan.plan_grid, shapes, scale=self._plan_scale)
         ranges = (b.gaussian_count, b.gaussian_ends, b.gaussian_range)
         record_ranges(program, *ranges, self._needed, capacity=self._capacity)
         for kernels in self._kernels:
             self._launch(program, kernels.forward, self._capacity)
-        if self.softness:
-            kernel, sigma = soft.soft_gaussians_forward, self.softness.sigma
-            self._launch(program, kernel, self._capacity, softness=sigma)
-        else:
-            self._launch(program, gaussians.gaussians_forward, self._capacity)
+        kernel = soft.soft_gaussians_forward if self.softness else gaussians.gaussians_forward
+        self._launch(program, kernel, self._capacity)
 
     def backward(self, program: Program) -> None:
         """Record gradients of means, conics and strengths -> gradients of the shapes' attributes."""
-        if self.softness:
-            kernel, sigma = soft.soft_differences_backward, self.softness.sigma
-            self._launch(program, kernel, self._capacity, softness=sigma, **self._scales)
-        else:
-            self._launch(program, gaussians.differences_backward, self._capacity, **self._scales)
+        kernel = soft.soft_differences_backward if self.softness else gaussians.differences_backward
+        self._launch(program, kernel, self._capacity)
         self._launch(program, gaussians.positions_backward, self._capacity)
         for kernels in self._kernels:
             if kernels.stations_backward:
