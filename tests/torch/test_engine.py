@@ -130,9 +130,6 @@ def test_capturing_an_unrendered_scene_is_refused(capturing: Callable[[bool], No
         step(random_scene(Kind.FILL, 3))
 
 
-Tensor = torch.Tensor
-
-
 def shifted(count: int) -> list[Scene]:
     """Return scenes of one structure."""
     scene = random_scene(Kind.FILL, 5)
@@ -145,7 +142,7 @@ def mixed() -> list[Scene]:
     return [*shifted(2), random_scene(Kind.STROKE, 3), opaque]
 
 
-def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[Tensor]:
+def found(scenes: list[Scene], threads: int, *, at_once: bool) -> list[torch.Tensor]:
     """Return images and gradients."""
     tensors = [SceneTensors.of(scene, requires_grad=True) for scene in scenes]
     wanted = [[v for v in each.values.values() if v.requires_grad] for each in tensors]

@@ -128,8 +128,6 @@ def test_gradients_flow_on_to_the_leaves() -> None:
     torch.testing.assert_close(colors.grad.T, whole(scene)["colors"], rtol=0, atol=0)
 
 
-Tensor = torch.Tensor
-
 SIZE = 48
 OFFSETS = [0.0, 1e-4, -1e-4, 0.3, 0.5]  # of coordinates that are whole numbers [px]
 STEP = 0.02
@@ -149,14 +147,14 @@ SHAPES = {
 PAINTS = {"fill": 'fill="#4a8"', "stroke": 'fill="none" stroke="#4a8"'}
 
 
-def weighted(image: Tensor) -> Tensor:
+def weighted(image: torch.Tensor) -> torch.Tensor:
     """Return a sum over an image with weights that hardly change from pixel to pixel."""
     y, x = torch.meshgrid(torch.arange(SIZE), torch.arange(SIZE), indexing="ij")
     weights = (1 + 0.0005 * x + 0.0003 * y)[..., None] * torch.tensor([0.5, -0.8, 0.3, 1.0])
     return (image.double() * weights).sum()
 
 
-def differences(loss: Callable[[Tensor], Tensor], at: Tensor) -> Tensor:
+def differences(loss: Callable[[torch.Tensor], torch.Tensor], at: torch.Tensor) -> torch.Tensor:
     """Return the central differences of a function of a tensor."""
     found = torch.zeros(at.numel())
     with torch.no_grad():
@@ -176,7 +174,7 @@ def test_gradients_on_pixel_borders_match_finite_differences(
     path.write_text(svg, encoding="utf-8")
     tensors = SceneTensors.of(warpsplat.load_svg(path))
 
-    def loss(values: Tensor, name: str) -> Tensor:
+    def loss(values: torch.Tensor, name: str) -> torch.Tensor:
         changed = SceneTensors(tensors.layout, {**tensors.values, name: values})
         return weighted(render(changed))
 

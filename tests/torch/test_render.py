@@ -24,18 +24,19 @@ from warpsplat.scene import Canvas, Kind, Scene
 from warpsplat.torch import Module, SceneTensors, over, render, tensors
 
 FILL = Kind.FILL
+Tensor = torch.Tensor
 
 
-def loss_of(scene: SceneTensors, **options: Any) -> torch.Tensor:
+def loss_of(scene: SceneTensors, **options: Any) -> Tensor:
     return render(scene, **options).square().sum()
 
 
-def points_grad(loss: torch.Tensor, scene: SceneTensors, **options: Any) -> torch.Tensor:
+def points_grad(loss: Tensor, scene: SceneTensors, **options: Any) -> Tensor:
     (gradient,) = torch.autograd.grad(loss, [scene.values["points"]], **options)
     return gradient
 
 
-def assert_equal(one: torch.Tensor | None, other: torch.Tensor | None) -> None:
+def same(one: object, other: object) -> None:
     torch.testing.assert_close(one, other, rtol=0, atol=0)
 
 
@@ -97,9 +98,9 @@ def test_calls_do_not_disturb_one_another(order: tuple[int, int]) -> None:
     losses = [image.square().sum() for image in images]
     found = {i: points_grad(losses[i], scenes[i], retain_graph=True) for i in (*order, *order)}
     for i in order:
-        assert_equal(found[i], alone[i])
-        assert_equal(points_grad(losses[i], scenes[i]), alone[i])
-        assert_equal(images[i], copies[i])
+        same(found[i], alone[i])
+        same(points_grad(losses[i], scenes[i]), alone[i])
+        same(images[i], copies[i])
     assert not torch.equal(*alone)
 
 
@@ -121,13 +122,13 @@ def test_several_threads_find_what_one_finds(threads: int) -> None:
     scenes = [moved(random_scene(FILL, 6, seed=k // 2), float(k % 2)) for k in range(6)]
     alone = [points_grad(loss_of(scene), scene) for scene in scenes]
 
-    def work(scene: SceneTensors) -> list[torch.Tensor]:
+    def work(scene: SceneTensors) -> list[Tensor]:
         return [points_grad(loss_of(scene, threads=threads), scene) for _ in range(8)]
 
     with ThreadPoolExecutor(len(scenes)) as pool:
         for gradients, want in zip(pool.map(work, scenes), alone, strict=True):
             for gradient in gradients:
-                assert_equal(gradient, want)
+                same(gradient, want)
 
 
 def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,7 +139,7 @@ def test_float64_is_rendered_in_float32_and_has_gradients_of_float64(monkeypatch
         render(SceneTensors(scene.layout, {"points": double}))
     (gradient,) = torch.autograd.grad(loss_of(SceneTensors(scene.layout, {"points": double})), [double])
     assert gradient.dtype == torch.float64
-    assert_equal(gradient.float(), points_grad(loss_of(scene), scene))
+    same(gradient.float(), points_grad(loss_of(scene), scene))
 
 
 def test_over() -> None:
@@ -156,7 +157,6 @@ def test_without_torch_one_line_says_what_to_do() -> None:
     assert done.stderr.splitlines()[-1] == message
 
 
-Tensor = torch.Tensor
 LAYOUT = random_scene(Kind.FILL, 3)
 POINTS = torch.tensor(LAYOUT.points)
 OPACITIES = torch.tensor(LAYOUT.opacities)
@@ -177,10 +177,6 @@ def loss(points: Tensor, opacities: Tensor) -> Tensor:
 def plain(points: Tensor, opacities: Tensor) -> tuple[Tensor, ...]:
     inputs = points.clone().requires_grad_(), opacities.clone().requires_grad_()
     return torch.autograd.grad(loss(*inputs), inputs)
-
-
-def same(one: object, other: object) -> None:
-    torch.testing.assert_close(one, other, rtol=0, atol=0)
 
 
 def test_grad_and_vjp() -> None:

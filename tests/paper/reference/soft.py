@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import torch
 
-from tests.paper.reference.grid import Plan, differences, fill_grid
-from tests.paper.reference.splat import gaussian_values, straightness
+from tests.paper.reference.grid import Plan, fill_grid
+from tests.paper.reference.splat import gaussian_values, gaussians
 from tests.reference.curves import Tensors, bezier, points_of
 from warpsplat.paper import constants as k
 from warpsplat.scene import Kind, Scene
@@ -16,23 +16,6 @@ def stroke_row(points: torch.Tensor, stations: int) -> torch.Tensor:
     cubics = (len(points) - 1) // 3
     t = (torch.arange(stations) + 0.5) * cubics / stations
     return bezier(points, t)[None]
-
-
-def gaussians(
-    grid: torch.Tensor, width: torch.Tensor, softness: float, detach: bool
-) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, stations, 2]; all in px."""
-    source = grid.detach() if detach else grid
-    dx = differences(source.transpose(0, 1)).transpose(0, 1)
-    dr = differences(source)
-    length = dx.norm(dim=2)
-    perpendicular = (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0]) / length
-    straight = straightness(source.detach().transpose(0, 1)).transpose(0, 1)
-    least = softness**2 + k.PIXEL_VARIANCE
-    scale_x = torch.sqrt((k.SPREAD * straight * length) ** 2 + least)
-    scale_y = torch.sqrt((k.SPREAD * perpendicular) ** 2 + (k.WIDTH_SIGMA * width) ** 2 + least)
-    angle = torch.atan2(dx[..., 1], dx[..., 0])
-    return grid.reshape(-1, 2), torch.stack([scale_x, scale_y], 2).reshape(-1, 2), angle.reshape(-1)
 
 
 def strengths(p: Tensors, shape: int, plan: Plan) -> torch.Tensor:
@@ -58,7 +41,8 @@ def coverages(
         points = points_of(scene, p, shape)
         fill = scene.kind[shape] == Kind.FILL
         grid = scale * (fill_grid(points, plan) if fill else stroke_row(points, plan.columns))
-        made = gaussians(grid, scale * p["widths"][shape], scale * softness, detach)
+        least = (scale * softness) ** 2 + k.PIXEL_VARIANCE
+        made = gaussians(grid, detach, least=least, half=k.WIDTH_SIGMA * scale * p["widths"][shape])
         cut = torch.full((plan.rows * plan.columns,), k.Q_SOFT)
         g = gaussian_values(*made, cut, width, height, most=1.0)
         covers.append(1 - torch.prod(1 - strengths(p, shape, plan)[:, None, None] * g, dim=0))

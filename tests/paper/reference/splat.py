@@ -19,9 +19,17 @@ def straightness(x: torch.Tensor) -> torch.Tensor:
 
 
 def gaussians(
-    grid: torch.Tensor, detach: bool = False, runs: int = 1
+    grid: torch.Tensor,
+    detach: bool = False,
+    runs: int = 1,
+    *,
+    least: float = k.PIXEL_SIGMA**2,
+    half: torch.Tensor | float = 0.0,
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, columns, 2] in px."""
+    """(mean [n, 2], scale [n, 2], angle [n]) of grid positions [rows, columns, 2]; all in px.
+
+    ``least``: variance that all have at least; ``half``: scale across that is learnt.
+    """
     source = grid.detach() if detach else grid
     stretches = torch.chunk(source.transpose(0, 1), runs)
     dx = torch.cat([differences(x) for x in stretches]).transpose(0, 1)
@@ -29,8 +37,8 @@ def gaussians(
     length = dx.norm(dim=2)
     perpendicular = (dx[..., 0] * dr[..., 1] - dx[..., 1] * dr[..., 0]) / length
     straight = torch.cat([straightness(x.detach()) for x in stretches]).transpose(0, 1)
-    scale_x = torch.sqrt((k.SPREAD * straight * length) ** 2 + k.PIXEL_SIGMA**2)
-    scale_y = torch.sqrt((k.SPREAD * perpendicular) ** 2 + k.PIXEL_SIGMA**2)
+    scale_x = torch.sqrt((k.SPREAD * straight * length) ** 2 + least)
+    scale_y = torch.sqrt((k.SPREAD * perpendicular) ** 2 + half**2 + least)
     angle = torch.atan2(dx[..., 1], dx[..., 0])
     return grid.reshape(-1, 2), torch.stack([scale_x, scale_y], 2).reshape(-1, 2), angle.reshape(-1)
 
