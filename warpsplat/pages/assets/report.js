@@ -258,12 +258,12 @@
     event.preventDefault();
   });
   viewer.addEventListener("point", (event) => {
-    const shape = shapeOf(event.detail.target);
+    const shape = shapeOf(event.detail);
     if (shape !== null) reveal(shape);
     mark(shape ?? selected);
   });
   viewer.addEventListener("leave", () => mark(selected));
-  viewer.addEventListener("tap", (event) => select(shapeOf(event.detail.target)));
+  viewer.addEventListener("tap", (event) => select(shapeOf(event.detail)));
 
   // Layers.
 

@@ -6,8 +6,8 @@
   const MAGNIFIED = 3; // from this magnification on pixels are shown as squares
 
   class Viewer extends EventTarget {
-    // Events: "view" when zoom or position change; "point" (detail: {x, y, target}) when the pointer moves without a
-    // button; "tap" (the same) when it is pressed and released in one place; "leave"; "show" (detail: {side, name}).
+    // Events: "point" (detail: the element) when the pointer moves without a button; "tap" (the same) when it is
+    // pressed and released in one place; "leave"; "show" when a side shows another picture.
 
     constructor(root) {
       super();
@@ -62,7 +62,7 @@
       }
       const choice = this.root.querySelector(`select[data-side="${side}"]`);
       if (choice) choice.value = name;
-      this.dispatchEvent(new CustomEvent("show", { detail: { side, name } }));
+      this.dispatchEvent(new Event("show"));
     }
 
     shown(side) {
@@ -158,7 +158,6 @@
       for (const [name, is] of [["fit", this.fitted], ["actual", Math.abs(this.k - 1) < 1e-6]]) {
         this.root.querySelector(`[data-zoom="${name}"]`)?.setAttribute("aria-pressed", String(is));
       }
-      this.dispatchEvent(new Event("view"));
     }
 
     command(name) {
@@ -199,11 +198,8 @@
       const { stage, pointers } = this;
       let begun = null;
       const send = (name, event) => {
-        const box = stage.getBoundingClientRect();
-        const x = (event.clientX - box.left - this.x) / this.k;
-        const y = (event.clientY - box.top - this.y) / this.k;
-        const target = document.elementFromPoint(event.clientX, event.clientY);
-        this.dispatchEvent(new CustomEvent(name, { detail: { x, y, target } }));
+        const detail = document.elementFromPoint(event.clientX, event.clientY);
+        this.dispatchEvent(new CustomEvent(name, { detail }));
       };
       stage.addEventListener("pointerdown", (event) => {
         if (event.button !== 0) return;
