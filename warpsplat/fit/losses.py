@@ -211,7 +211,7 @@ def _launch_by_contour(kernel: wp.Kernel) -> Callable[[Program, LossInputs, floa
 
 
 def _bending_weight(inputs: LossInputs) -> float:
-    canvas = inputs.renderer.parameters.canvas
+    canvas = inputs.renderer.parameters.structure.canvas
     return inputs.settings.bending / (3 * canvas.width * canvas.height)
 
 

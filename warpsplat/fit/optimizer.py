@@ -40,7 +40,7 @@ def record_adam(program: Program, parameters: Parameters, clock: wp.array, setti
         from warpsplat.kernels.paint import gradient_backward  # takes long to import
 
         program.launch(gradient_backward.tie_circles, parameters.shape_count, parameters.arrays)
-    units = units_of(settings, parameters.canvas)
+    units = units_of(settings, parameters.structure.canvas)
     buffers = parameters.backend.allocate(AdamBuffers, {"shapes": parameters.shape_count})
     program.launch(
         adam.advance,

@@ -73,7 +73,7 @@ class FitState:
     @property
     def shape_count(self) -> int:
         """Number of shapes that are drawn: pictures which a file keeps do not count."""
-        return self.parameters.shape_count - len(self.parameters.pictures)
+        return self.parameters.shape_count - len(self.parameters.structure.pictures)
 
     def scene(self) -> Scene:
         """Return the current scene, on the host."""

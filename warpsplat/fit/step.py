@@ -27,6 +27,7 @@ from warpsplat.rendering.program import Program, Replay
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import read_tiles
 from warpsplat.scene import FloatArray
+from warpsplat.scene.scene import level_ends
 
 
 class Target:
@@ -118,7 +119,7 @@ class Step:
         self.began = state.step if began is None else began
         model = model_for(self.settings, self.began, target.slack)
         self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
-        levels = [state.parameters.prefix(end) for end in state.parameters.level_ends]
+        levels = [state.parameters.prefix(end) for end in level_ends(state.parameters.structure)]
         self.level_renderers = [Renderer(level, target.viewport, model=model) for level in levels]
         self._level_target = self._new_loss_target() if levels else self.loss_target
         if self.settings.density.interval:

@@ -45,7 +45,7 @@ class Painting:
         self._shape_count = parameters.shape_count
         self.has_gradients = bool(parameters.paints & set(GRADIENTS))
         self._pictures = (
-            picture_arrays(parameters.pictures, inputs.viewport, self._backend)
+            picture_arrays(parameters.structure.pictures, inputs.viewport, self._backend)
             if Paint.PICTURE in parameters.paints
             else None
         )

@@ -18,16 +18,14 @@ from warpsplat.scene import (
     ATTRIBUTES,
     Attribute,
     Basis,
-    Canvas,
     FloatArray,
     IndexArray,
-    KeptPicture,
     Kind,
     Paint,
     Scene,
 )
 from warpsplat.scene.attributes import NO_DASHES, Cap, Join
-from warpsplat.scene.scene import level_ends, numbers_in, starts_of
+from warpsplat.scene.scene import numbers_in, starts_of
 
 ELEMENTS = {1: wp.float32, 2: wp.vec2, 3: wp.vec3, 6: frame}
 """Type as which kernels read a row of so many numbers."""
@@ -70,7 +68,8 @@ class Parameters:
         )
 
     def _upload(self, scene: Scene, moments: Moments, ages: np.ndarray) -> None:
-        self._scene = scene
+        self.structure = scene
+        """The scene as it was last uploaded: its attributes may have changed since, the rest not."""
         self._upload_layout(scene, ages)
         self._upload_values(scene, moments)
 
@@ -167,7 +166,7 @@ class Parameters:
 
         It holds as long as the arrays do: until the next ``rearrange``.
         """
-        part = Parameters(self._scene.take(np.arange(count)), self.backend)
+        part = Parameters(self.structure.take(np.arange(count)), self.backend)
         for name, group in part.groups.items():
             rows, size = group.value.shape
             group.value = view(self.groups[name].value, wp.float32, (rows, size))
@@ -204,7 +203,7 @@ class Parameters:
     @property
     def kinds(self) -> frozenset[Kind]:
         """Kinds of shapes in the scene."""
-        return frozenset(Kind(k) for k in numbers_in(self._scene.kind))
+        return frozenset(Kind(k) for k in numbers_in(self.structure.kind))
 
     @property
     def curves(self) -> bool:
@@ -214,31 +213,11 @@ class Parameters:
     @property
     def paints(self) -> frozenset[Paint]:
         """Paints of shapes in the scene."""
-        return frozenset(Paint(k) for k in numbers_in(self._scene.paint))
-
-    @property
-    def pictures(self) -> tuple[KeptPicture, ...]:
-        """``Scene.pictures``."""
-        return self._scene.pictures
-
-    @property
-    def structure(self) -> Scene:
-        """The scene as it was last uploaded: its attributes may have changed since, the rest not."""
-        return self._scene
-
-    @property
-    def level_ends(self) -> tuple[int, ...]:
-        """``level_ends`` of the scene."""
-        return level_ends(self._scene)
-
-    @property
-    def canvas(self) -> Canvas:
-        """The scene's canvas."""
-        return self._scene.canvas
+        return frozenset(Paint(k) for k in numbers_in(self.structure.paint))
 
     def scene(self) -> Scene:
         """Copy the current values to the host."""
-        return replace(self._scene, **self._download("value"))
+        return replace(self.structure, **self._download("value"))
 
     def gradients(self) -> dict[str, FloatArray]:
         """Copy the gradients to the host, in the shapes of the scene's fields."""
@@ -250,7 +229,7 @@ class Parameters:
 
     def _download(self, field: str) -> dict[str, Any]:
         return {
-            name: getattr(group, field).numpy().reshape(self._scene.shape_of(group.attribute)).copy()
+            name: getattr(group, field).numpy().reshape(self.structure.shape_of(group.attribute)).copy()
             for name, group in self.groups.items()
         }
 
@@ -270,7 +249,7 @@ class Parameters:
         """Take ``scene``, the same shapes with other paints; stops of shapes that change start over. As after
         ``rearrange``, launches must be recorded again.
         """
-        before = self._scene
+        before = self.structure
         kept = np.flatnonzero((before.paint == scene.paint) & (np.diff(scene.stop_first) > 0))
         stops = next(a for a in ATTRIBUTES if a.per == "stop")
 
@@ -320,7 +299,7 @@ class Parameters:
         """
         for name, group in self.groups.items():
             rows = shapes[group.owner.numpy()]
-            first = getattr(self._scene, name).reshape(group.value.shape)
+            first = getattr(self.structure, name).reshape(group.value.shape)
             for array, values in ((group.value, first), (group.moment1, 0.0), (group.moment2, 0.0)):
                 array.assign(np.where(rows[:, None], values, array.numpy()).astype(np.float32))
         self.arrays["ages"].assign(np.where(shapes, 0, self.arrays["ages"].numpy()).astype(np.int32))

@@ -89,7 +89,8 @@ class Renderer:
         self.backend = parameters.backend
         check_memory(viewport, self.backend.device)
         self.model, self._opaque = model, opaque or straight
-        self.film = Film(self.backend, viewport, parameters.canvas, opaque=self._opaque, straight=straight)
+        canvas = parameters.structure.canvas
+        self.film = Film(self.backend, viewport, canvas, opaque=self._opaque, straight=straight)
         self._needed = self.backend.array(wp.int32, 2)
         self.needed_samples, self.needed_slots = self._needed[:1], self._needed[1:]
         self._needed_on_host = self._needed.numpy() if self.backend.device.is_cpu else None
