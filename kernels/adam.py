@@ -21,8 +21,7 @@ def advance(
     # Out:
     ages: wp.array[wp.int32],  # [shape_count] steps since the shape was placed, this one included
     clock: wp.array[wp.int32],  # [1] steps since the start, this one included
-    bias1: wp.array[wp.float32],  # [shape_count] bias correction of the moments at that age
-    bias2: wp.array[wp.float32],  # [shape_count]
+    biases: wp.array[wp.vec2],  # [shape_count] bias correction of the two moments at that age
     decay: wp.array[wp.float32],  # [1] fraction of the learning rates at this step
 ):
     """Count the step, on the device, so that a captured graph can be replayed unchanged.
@@ -32,8 +31,7 @@ def advance(
     """
     i = offset + wp.tid()
     ages[i] = ages[i] + 1
-    bias1[i] = 1.0 - power(beta1, ages[i])
-    bias2[i] = 1.0 - power(beta2, ages[i])
+    biases[i] = wp.vec2(1.0 - power(beta1, ages[i]), 1.0 - power(beta2, ages[i]))
     if i == 0:
         clock[0] = clock[0] + 1
         progress = wp.min(float(clock[0]) / float(step_count), 1.0)
@@ -68,8 +66,7 @@ def adam_update(
     kinds: wp.int32,  # the kinds that have the attribute, a bit each
     paint: wp.array[wp.int32],  # [shape_count]
     paints: wp.int32,  # the paints that have it, a bit each
-    bias1: wp.array[wp.float32],  # [shape_count]
-    bias2: wp.array[wp.float32],  # [shape_count]
+    biases: wp.array[wp.vec2],  # [shape_count]
     decay: wp.array[wp.float32],  # [1]
     beta1: wp.float32,  # as in ``advance``
     beta2: wp.float32,
@@ -96,8 +93,8 @@ def adam_update(
     g = grad[row, j]
     m1 = beta1 * moment1[row, j] + (1.0 - beta1) * g
     m2 = beta2 * moment2[row, j] + (1.0 - beta2) * g * g
-    m1_hat = m1 / bias1[shape]
-    m2_hat = m2 / bias2[shape]
+    m1_hat = m1 / biases[shape][0]
+    m2_hat = m2 / biases[shape][1]
     new = value[row, j] - current * m1_hat / (wp.sqrt(m2_hat) + EPSILON)
     # Any number that is not finite makes one of these so: moment2 alone, infinite, would make the update 0.
     if not (wp.isfinite(new) and wp.isfinite(m2)):

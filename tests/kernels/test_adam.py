@@ -26,8 +26,7 @@ def state(start: np.ndarray, owner: list[int], kind: list[int], device: str) -> 
         "paint": wp.zeros(len(kind), dtype=int, device=device),
         "ages": wp.zeros(len(kind), dtype=int, device=device),
         "clock": wp.zeros(1, dtype=int, device=device),
-        "bias1": wp.zeros(len(kind), dtype=float, device=device),
-        "bias2": wp.zeros(len(kind), dtype=float, device=device),
+        "biases": wp.zeros(len(kind), dtype=wp.vec2, device=device),
         "decay": wp.zeros(1, dtype=float, device=device),
         "broken": wp.zeros(len(kind), dtype=int, device=device),
     }

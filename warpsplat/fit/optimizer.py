@@ -19,10 +19,8 @@ from warpsplat.scene import Canvas, Unit
 class AdamBuffers:
     """Values that the updates of a step share."""
 
-    bias1: wp.array = buffer(wp.float32, "shapes")
-    """Bias correction of each shape's first moments at its age."""
-    bias2: wp.array = buffer(wp.float32, "shapes")
-    """Likewise of the second moments."""
+    biases: wp.array = buffer(wp.vec2, "shapes")
+    """Bias correction of each shape's first and second moments at its age."""
     decay: wp.array = buffer(wp.float32, 1)
     """Factor of the learning rates at this step."""
 
