@@ -17,7 +17,7 @@ from warpsplat.fit.settings import Settings, make_settings
 from warpsplat.metrics import score_svg
 from warpsplat.rendering.backend import Backend
 from warpsplat.rendering.renderer import render
-from warpsplat.run.paper import Paper
+from warpsplat.run.physical_size import PhysicalSize
 from warpsplat.run.refine import refine_svg
 from warpsplat.run.result import Result
 from warpsplat.scene import Basis, Kind
@@ -117,7 +117,7 @@ def test_a_picture_on_a_sheet_stays_there(device: str, sheet: dict[str, str]) ->
     settings = make_settings(curves=6, iterations=20, **sheet)
     scene = random_scene(Kind.FILL, count=6, width=48, height=36, seed=2)
     still = write_svg(scene, per_pixel=2, background=not sheet.get("background"))
-    text = Paper(settings, (48, 36), (96, 96), "")(still)
+    text = PhysicalSize(settings, (48, 36), (96, 96), "").given_to(still)
     wanted, result = (improved(svg, target, settings, device)[0] for svg in (still, text))
     assert wanted.score and result.before
     assert scored(result).psnr == scored(wanted).psnr > result.before

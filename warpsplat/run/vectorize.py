@@ -23,7 +23,13 @@ from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import Explained, explained
 from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
 from warpsplat.run.formats import write_named
-from warpsplat.run.paper import bridge_notes, export_within, on_removed, paper_for, with_pixels
+from warpsplat.run.physical_size import (
+    bridge_notes,
+    export_within,
+    on_removed,
+    physical_size,
+    with_pixels,
+)
 from warpsplat.run.prepare import PreparedImage, prepare
 from warpsplat.run.result import STOPPED, Result
 from warpsplat.run.second_look import other_subject, retaken
@@ -215,7 +221,7 @@ def _drawn(
 ) -> _File:
     """Return the file of what was made of an image."""
     release_memory()
-    paper = paper_for(image, settings)
+    physical = physical_size(image, settings)
     problem, shown, notes = image.problem, made.scene, image.notes
     background = shown.canvas.background
     # A file that was cut short must not pass for a finished one.
@@ -224,13 +230,13 @@ def _drawn(
     if is_removed:
         notes += removal_notes(background, settings)
         shown = replace(shown, canvas=replace(shown.canvas, background=solid_color(settings.background)))
-    svg, scene = export_within(shown, settings, made.per_pixel, metadata, paper)
+    svg, scene = export_within(shown, settings, made.per_pixel, metadata, physical)
     judged = svg
     if is_removed and background is not None:
         judged = on_removed(svg, scene, settings, made.per_pixel, background)
     notes += (optics.words(),) if optics else ()
-    notes += (*paper.notes(), *bridge_notes(scene, settings, made.per_pixel))
-    return _File(paper(svg), judged, scene, notes)
+    notes += (*physical.notes(), *bridge_notes(scene, settings, made.per_pixel))
+    return _File(physical.given_to(svg), judged, scene, notes)
 
 
 def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:

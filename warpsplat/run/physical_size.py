@@ -1,4 +1,4 @@
-"""The size of a file on paper, and its size in bytes."""
+"""The size of a file in millimetres or on a sheet of paper, and its size in bytes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from warpsplat.svg.write import on_background
 
 
 @dataclass(frozen=True)
-class Paper:
-    """The sheet that a file is drawn on, or the size of the picture alone."""
+class PhysicalSize:
+    """The sheet of paper that a file is drawn on, or the size of the picture alone."""
 
     settings: Settings
     size: tuple[int, int]
@@ -36,8 +36,8 @@ class Paper:
     where_from: str
     """Where that is from, for people."""
 
-    def __call__(self, svg: str) -> str:
-        """Return a file written here with the size that the settings ask for, if any."""
+    def given_to(self, svg: str) -> str:
+        """Return a file that this program wrote with the size that the settings ask for, if any."""
         settings = self.settings
         if settings.size or settings.page:
             return on_sheet(svg, self.sheet)
@@ -61,14 +61,14 @@ class Paper:
         return natural_sheet(*self.size, self.resolution, settings.units)
 
 
-def paper_for(image: PreparedImage, settings: Settings) -> Paper:
-    """Return what the file of an image is drawn on."""
+def physical_size(image: PreparedImage, settings: Settings) -> PhysicalSize:
+    """Return the size of the file of an image."""
     resolution, where_from = (PIXELS_AN_INCH, PIXELS_AN_INCH), "as the image file states none; --dpi gives it"
     if settings.dpi:
         resolution, where_from = (settings.dpi, settings.dpi), "by --dpi"
     elif image.resolution:
         resolution, where_from = image.resolution, "by the image file"
-    return Paper(settings, image.size, resolution, where_from)
+    return PhysicalSize(settings, image.size, resolution, where_from)
 
 
 def with_pixels(image: PreparedImage) -> PreparedImage:
@@ -90,7 +90,7 @@ def _pixels(image: PreparedImage, name: str) -> str:
         return ""
     length, unit = length_of(text, name)
     if unit:
-        length *= MILLIMETRES[unit] * paper_for(image, settings).sheet.scale(*image.size)
+        length *= MILLIMETRES[unit] * physical_size(image, settings).sheet.scale(*image.size)
     return f"{length:.9g}"
 
 
@@ -114,15 +114,13 @@ def bridge_notes(scene: Scene, settings: Settings, per_pixel: float) -> tuple[st
 
 
 def export_within(
-    scene: Scene, settings: Settings, per_pixel: float, metadata: str, paper: Paper
+    scene: Scene, settings: Settings, per_pixel: float, metadata: str, physical: PhysicalSize
 ) -> tuple[str, Scene]:
-    """Return the SVG, not yet on paper, and its shapes: all, or those that show most if ``max_bytes`` allows
-    no more.
-    """
+    """Return the SVG without its physical size, and its shapes: those that show most within ``max_bytes``."""
 
     def made() -> tuple[str, int]:
         text = finished(for_machines(scene, settings, per_pixel), settings, per_pixel, metadata)
-        return text, len(paper(text).encode())
+        return text, len(physical.given_to(text).encode())
 
     svg, size = made()
     while settings.max_bytes and size > settings.max_bytes and len(scene) > 1:
