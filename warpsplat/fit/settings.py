@@ -91,6 +91,16 @@ TUNING: dict[str, Any] = {"subjects": ("photo",), "elsewhere": "ignored"}
 DRAWN: dict[str, Any] = {"subjects": ("drawing",), "elsewhere": "ignored"}
 """Arguments of options that change how drawings are traced."""
 
+main_option = functools.partial(option, group="What to make")
+shape_option = functools.partial(option, group="Shapes")
+color_option = functools.partial(option, group="Colours")
+limit_option = functools.partial(option, group="Goals and limits")
+fit_option = functools.partial(option, group="Fitting")
+drawing_option = functools.partial(option, group="Drawings")
+size_option = functools.partial(option, group="Size on paper")
+machine_option = functools.partial(option, group="Cutters and plotters")
+svg_option = functools.partial(option, group="Contents of the SVG")
+"""Declare a field whose option is in a group of the help."""
 
 LEVEL_FACTOR, LEAST_LEVEL_SHAPES = 4, 8
 """Shapes of a level over those of the one before if only ``layered`` is asked for, and least of the first."""
@@ -189,24 +199,22 @@ class Given(NamedTuple):
 class Settings:
     """Everything but the image that decides the result. Fields without help are set by other options."""
 
-    curves: int = option(
+    curves: int = shape_option(
         512,
         "Number of shapes; with a goal, the maximum.",
         (1, 100_000),
         shown_default="512; fewer for a simple image",
         subjects=("photo", "drawing"),
         elsewhere="ignored",
-        group="Shapes",
         common=True,
     )
-    subject: Subject = option(
+    subject: Subject = main_option(
         "auto",
         "Kind of image: photos are fitted with shapes, the other kinds are traced; silhouette: outlines of"
         " objects photographed on a plain ground.",
-        group="What to make",
         common=True,
     )
-    kind: Kind = option(
+    kind: Kind = shape_option(
         Kind.FILL,
         **FITTED,
         shorthands=(
@@ -219,9 +227,8 @@ class Settings:
                 common=True,
             ),
         ),
-        group="Shapes",
     )
-    shape: str = option(
+    shape: str = shape_option(
         CURVE,
         "Form of all shapes: triangle, rectangle, ellipse, circle, polygon:N, or line, a straight stroke.",
         shown_default="free outlines",
@@ -230,17 +237,15 @@ class Settings:
         metavar="FORM",
         values=tuple(FORMS),
         **FITTED,
-        group="Shapes",
         common=True,
     )
-    mixed: bool = option(
+    mixed: bool = shape_option(
         False,
         "Fills and strokes together, whichever suits better; in line art, fills for filled areas.",
         subjects=("photo", "line"),
         elsewhere="fitted",
-        group="Shapes",
     )
-    iterations: int = option(
+    iterations: int = fit_option(
         1000,
         "Number of steps, instead of that of --quality.",
         (1, 1_000_000),
@@ -257,31 +262,27 @@ class Settings:
                 common=True,
             ),
         ),
-        group="Fitting",
     )
-    renderer: str = option(
+    renderer: str = fit_option(
         "exact",
         "How a fit renders shapes: as viewers do, as Gaussians close to that, or as the paper's soft ones.",
         **FITTED,
         choices=renderer_names(),
-        group="Fitting",
     )
-    paint: Painting | None = option(
+    paint: Painting | None = color_option(
         None,
         "Flat colours, one kind of gradient, or whichever is worth its bytes.",
         shown_default="flat for photos, auto for drawings",
         subjects=("photo", "drawing"),
         elsewhere="ignored",
-        group="Colours",
     )
-    loss: LossName = option(
+    loss: LossName = fit_option(
         "l2",
         "What a fit minimises: the squared error, or with it what differs in structure or along edges.",
         subjects=("photo",),
         refine=True,
-        group="Fitting",
     )
-    levels: tuple[int, ...] = option(
+    levels: tuple[int, ...] = shape_option(
         (),
         "Total number of shapes after each level, such as 64,256,1024.",
         **FITTED,
@@ -294,66 +295,48 @@ class Settings:
                 help="Levels from coarse to fine, as groups; those up to any one form a complete picture.",
             ),
         ),
-        group="Shapes",
     )
-    colors: int | None = option(
-        None,
-        "At most N colours; the shapes are then opaque.",
-        (1, MOST_COLOR_COUNT),
-        group="Colours",
-        common=True,
+    colors: int | None = color_option(
+        None, "At most N colours; the shapes are then opaque.", (1, MOST_COLOR_COUNT), common=True
     )
-    palette: tuple[str, ...] = option(
+    palette: tuple[str, ...] = color_option(
         (),
         "The only colours, as '#f80,white' in quotes, or a file of them.",
         metavar="COLORS",
         values=COLOR_NAMES,
         files=True,
         parse=parse_palette,
-        group="Colours",
     )
-    opaque: bool = option(False, "No translucent shapes.", **TUNING, group="Colours")
-    target_psnr: float | None = option(
-        None,
-        "Make the smallest file with a PSNR of at least DB.",
-        **FITTED,
-        metavar="DB",
-        group="Goals and limits",
+    opaque: bool = color_option(False, "No translucent shapes.", **TUNING)
+    target_psnr: float | None = limit_option(
+        None, "Make the smallest file with a PSNR of at least DB.", **FITTED, metavar="DB"
     )
-    time_budget: float | None = option(
+    time_budget: float | None = limit_option(
         None,
         "Time limit, such as 60s or 2m; the number of steps is adapted to it.",
         metavar="TIME",
         parse=parse_duration,
         refine=True,
-        group="Goals and limits",
     )
-    max_bytes: int | None = option(
+    max_bytes: int | None = limit_option(
         None,
         "Make the best file of at most this size, such as 100KB or 1MB.",
         subjects=("photo", "drawing"),
         elsewhere="fitted",
         metavar="SIZE",
         parse=parse_bytes,
-        group="Goals and limits",
         common=True,
     )
-    max_memory: int | None = option(
+    max_memory: int | None = limit_option(
         None,
         "Memory limit, such as 4GB; an image that needs more is processed at a reduced size.",
         metavar="SIZE",
         parse=parse_bytes,
-        group="Goals and limits",
     )
-    detail: float = option(
-        0.5,
-        "For drawings: from 0, few big shapes, to 1, every speck.",
-        FRACTION,
-        **DRAWN,
-        group="Drawings",
-        common=True,
+    detail: float = drawing_option(
+        0.5, "For drawings: from 0, few big shapes, to 1, every speck.", FRACTION, **DRAWN, common=True
     )
-    optics: str = option(
+    optics: str = drawing_option(
         "auto",
         "What a scan, a filter or resizing did to the edges of a drawing, to be undone: auto (found), none, "
         "the light alone (sRGB, linear), or the report.json of a run with --json.",
@@ -364,10 +347,9 @@ class Settings:
         files=True,
         parse=how.parse_optics,
         **DRAWN,
-        group="Drawings",
     )
-    seed: int = option(0, "Random seed.", (0, 2**32 - 1), **TUNING, group="Fitting")
-    background: str = option(
+    seed: int = fit_option(0, "Random seed.", (0, 2**32 - 1), **TUNING)
+    background: str = color_option(
         "auto",
         "auto (transparent where the image is), none, or a colour: white, or '#fff' in quotes.",
         pattern=f"auto|none|(?i:{COLOR.pattern})",
@@ -376,123 +358,85 @@ class Settings:
         values=("auto", "none", *COLOR_NAMES),
         parse=parse_background,
         refine=True,
-        group="Colours",
         common=True,
     )
-    remove_background: Removal | None = option(
+    remove_background: Removal | None = color_option(
         None,
         "Leave out the colour of the border: from there inwards, as --background none does, or also in holes,"
         " such as those of letters.",
-        group="Colours",
     )
-    title: str = option(
-        "",
-        "Title of the picture, in the file.",
-        (0, 1000),
-        metavar="TEXT",
-        refine=True,
-        group="Contents of the SVG",
+    title: str = svg_option("", "Title of the picture, in the file.", (0, 1000), metavar="TEXT", refine=True)
+    size: str = size_option(
+        "", "Size of the picture, such as 200x150mm; or one side, as in 200mm, x150mm.", metavar="WxH"
     )
-    size: str = option(
-        "",
-        "Size of the picture, such as 200x150mm; or one side, as in 200mm, x150mm.",
-        metavar="WxH",
-        group="Size on paper",
-    )
-    page: str = option(
+    page: str = size_option(
         "",
         "Sheet of paper, with margins: a3, a4, a5, letter.",
         metavar="NAME",
         values=("a3", "a4", "a5", "letter"),
-        group="Size on paper",
     )
-    units: str = option(
+    units: str = size_option(
         "",
         "Unit of the size in the file, which follows from the image's resolution: mm, cm, in, pt; or px.",
         metavar="UNIT",
         values=("mm", "cm", "in", "pt", "px"),
-        group="Size on paper",
     )
-    dpi: float | None = option(
+    dpi: float | None = size_option(
         None,
         "Resolution of the image in pixels per inch, for its size in the file.",
         (1, 1e6),
         shown_default="that in the image file, else 96",
         metavar="N",
-        group="Size on paper",
     )
-    dxf: DxfCurves = option(
+    dxf: DxfCurves = machine_option(
         "arcs",
         "Curves in a .dxf: arcs; splines; lines, for OpenSCAD; r12: lines, for old programs.",
         refine=True,
-        group="Cutters and plotters",
     )
-    width: str = option(
+    width: str = machine_option(
         "",
         "For line art: one width for all strokes, in pixels or, such as 0.3mm, on the sheet.",
         metavar="N",
         parse=str,
         subjects=("line",),
         elsewhere="ignored",
-        group="Cutters and plotters",
     )
-    ids: bool = option(
-        False,
-        "Name paths after their colours, and group neighbouring paths of one colour.",
-        refine=True,
-        group="Contents of the SVG",
+    ids: bool = svg_option(
+        False, "Name paths after their colours, and group neighbouring paths of one colour.", refine=True
     )
-    simple: bool = option(
-        False,
-        "Outlines of fills that do not cross themselves, as those of drawings.",
-        refine=True,
-        group="Cutters and plotters",
+    simple: bool = machine_option(
+        False, "Outlines of fills that do not cross themselves, as those of drawings.", refine=True
     )
-    separate: bool = option(
-        False,
-        "A path for each connected part of a colour, with its holes.",
-        refine=True,
-        group="Cutters and plotters",
+    separate: bool = machine_option(
+        False, "A path for each connected part of a colour, with its holes.", refine=True
     )
-    stack: Stack = option(
+    stack: Stack = machine_option(
         "overlap",
         "Whether shapes overlap, or each is cut where others cover it; photos are opaque then.",
         refine=True,
-        group="Cutters and plotters",
     )
-    bridges: str = option(
+    bridges: str = machine_option(
         "",
         "For stencils: bridges of a width, in pixels or such as 2mm, that hold what is within an outline.",
         metavar="N",
         parse=str,
         subjects=("drawing",),
-        group="Cutters and plotters",
     )
-    symbols: bool = option(
-        False,
-        "Write equal outlines once, as symbols; nearly equal ones become equal.",
-        subjects=("drawing",),
-        group="Drawings",
+    symbols: bool = drawing_option(
+        False, "Write equal outlines once, as symbols; nearly equal ones become equal.", subjects=("drawing",)
     )
-    strokes: bool = option(
-        False,
-        "Lines of even width with round ends become strokes, but not in drafts.",
-        **DRAWN,
-        group="Drawings",
+    strokes: bool = drawing_option(
+        False, "Lines of even width with round ends become strokes, but not in drafts.", **DRAWN
     )
-    minify: bool = option(
-        False,
-        "Write the shortest text, without line breaks and without the mark of warpsplat.",
-        refine=True,
-        group="Contents of the SVG",
+    minify: bool = svg_option(
+        False, "Write the shortest text, without line breaks and without the mark of warpsplat.", refine=True
     )
-    precision: int | None = option(
+    precision: int | None = svg_option(
         None,
         "Maximum precision of coordinates, in decimals of a pixel.",
         (0, 6),
         shown_default="auto",
         refine=True,
-        group="Contents of the SVG",
     )
     simplify: bool = option(False)
     basis: Basis = research(
