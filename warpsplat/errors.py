@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import reprlib
 from collections.abc import Iterator
 from enum import IntEnum
 from typing import Any
@@ -113,7 +114,8 @@ def naming(name: str) -> Iterator[None]:
 def shown(value: object) -> str:
     """Return the ``repr`` of a refused value, shortened for a message."""
     try:
-        words = repr(value)
+        # The beginning of a list: with YAML's aliases a short text can have billions of values.
+        words = reprlib.repr(value) if isinstance(value, (list, tuple, dict)) else repr(value)
     except ValueError:  # a number of thousands of digits
         words = f"a {type(value).__name__} of very many digits"
     return cut(words)

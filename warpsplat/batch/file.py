@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from warpsplat.batch.run_options import BatchOptions
-from warpsplat.errors import ImageError, UsageError, cut, shown
+from warpsplat.errors import ImageError, UsageError, shown
 from warpsplat.files.inputs import read_input
 from warpsplat.fit.options import nearest
 from warpsplat.run.names import ErrorAt
@@ -35,22 +35,20 @@ class BatchFile:
             raise UsageError(str(error)) from error
         except UnicodeDecodeError as error:
             raise UsageError(f"{path}: cannot be read: not UTF-8, at byte {error.start}") from error
-        self.loader: Any = None
         try:
-            self.loader = yaml.SafeLoader(text)
-            _check(self.loader, self.error)
-            self.root = yaml.compose(text, yaml.SafeLoader)
-            self.loader = yaml.SafeLoader("")
-        except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            raise self.error(mark.line + 1 if mark else 1, f"not valid YAML: {error.problem}") from None
+            self.loader = loader = yaml.SafeLoader(text)
         except yaml.reader.ReaderError as error:
             line = text.count("\n", 0, error.position) + 1
             raise self.error(line, f"not valid YAML: character {error.character!r} is not allowed") from None
-        except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
-            # An escape beyond Unicode, say: the scanner lets chr() raise.
-            cause = str(error).splitlines()[0]
-            raise self.error(self.loader.line + 1 if self.loader else 1, f"not valid YAML: {cause}") from None
+        try:
+            self.root = loader.get_single_node()
+        except yaml.MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            raise self.error(mark.line + 1 if mark else 1, f"not valid YAML: {error.problem}") from None
+        except RecursionError:
+            raise self.error(loader.line + 1, "not valid YAML: nested too deeply") from None
+        except (ValueError, OverflowError) as error:  # of chr(): an escape beyond Unicode
+            raise self.error(loader.line + 1, f"not valid YAML: {str(error).splitlines()[0]}") from None
 
     def error(self, line: int, message: str) -> UsageError:
         """Return an error that names the file and the line."""
@@ -103,55 +101,3 @@ def _listed(keys: Iterable[str]) -> str:
     words = ", ".join(key for key in keys if key not in BY_NAME and key not in RESEARCH_KEYS)
     options = "the options of vectorize (see warpsplat vectorize --help-all)"
     return " and ".join(filter(None, (words, options if BY_NAME.keys() & {*keys} else "")))
-
-
-def _check(loader: Any, error: Callable[[int, str], UsageError]) -> None:
-    """Check the size and depth of a document before it is built.
-
-    Raises:
-        UsageError: made by ``error`` from a line and a message.
-    """
-    sizes: dict[str, int] = {}
-    """Number of values that each anchor stands for, including itself."""
-    open_: list[tuple[str, int]] = []
-    """Anchors of the open collections, and the number of values before each."""
-    values = aliased = 0
-    max_depth = 16  # deepest nesting of a batch file; four levels are needed
-    max_scalar = 4096  # longest single value [characters]: as long as the longest path
-    max_aliased = 100_000  # most values that the aliases of a file stand for: aliases of aliases multiply
-    while loader.check_event():
-        event = loader.get_event()
-        line = event.start_mark.line + 1 if event.start_mark else 1
-        anchor = getattr(event, "anchor", None) or ""
-        size = 0
-        if isinstance(event, yaml.AliasEvent):
-            size = sizes.get(anchor, 1)
-            aliased += size
-            if aliased > max_aliased:
-                raise error(
-                    line, f"aliases stand for more than {max_aliased} values, the last is *{cut(anchor)}"
-                )
-        elif isinstance(event, yaml.CollectionStartEvent):
-            open_.append((anchor, values))
-            size = 1
-            if len(open_) > max_depth:
-                raise error(line, f"nested deeper than {max_depth} levels")
-        elif isinstance(event, yaml.ScalarEvent):
-            size = sizes[anchor] = 1 + len(event.value) // 100  # long values count several times
-            if len(event.value) > max_scalar:
-                raise error(line, f"a value of more than {max_scalar} characters")
-        values += size
-        if isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = open_.pop()
-            sizes[anchor] = values - before
-
-
-def plain(text: str) -> Any:
-    """Parse a YAML value within the limits of batch files.
-
-    Raises:
-        UsageError: it is beyond them.
-        yaml.YAMLError: it is no plain value.
-    """
-    _check(yaml.SafeLoader(text), lambda _, message: UsageError(message))
-    return yaml.safe_load(text)

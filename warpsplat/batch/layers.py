@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from warpsplat.batch.file import BatchFile, plain
+from warpsplat.batch.file import BatchFile
 from warpsplat.errors import UsageError, cut, shown
 from warpsplat.fit.options import nearest
 from warpsplat.run.names import ErrorAt
@@ -130,7 +130,7 @@ def assigned(text: str) -> tuple[str, Any]:
         hint = nearest(name, SINGLE_KEYS) or "; the keys are those of batch files"
         raise UsageError(f"--set {cut(text)}: unknown key {shown(name)}{hint}")
     try:
-        value = written if key in TEXT_KEYS else plain(written)
+        value = written if key in TEXT_KEYS else yaml.safe_load(written)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise UsageError(f"--set {cut(text)}: the value is not plain YAML") from error
     return key, {inner: value} if dot else value
