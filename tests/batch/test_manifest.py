@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests import ROOT
-from warpsplat.batch.manifest import MAX_LINE, NAME, Entry, Manifest, entry_of
+from warpsplat.batch.manifest import NAME, Entry, Manifest, entry_of
 from warpsplat.errors import UsageError
 
 GOOD = Entry("a.svg", "key", "made", "d1", "a.png", figures={"psnr": 20.5, "bytes": 7})
@@ -51,33 +51,14 @@ def test_a_torn_line_is_ignored_and_ends_where_the_next_begins(notes: Manifest) 
 @pytest.mark.parametrize(
     "line",
     [
-        *(b"", b"{", b"[1]", b"null", b"\xff\xfe", b"[" * 50_000, b"1" * 5000, b'"' + b"x" * MAX_LINE + b'"'),
+        *(b"", b"{", b"[1]", b"null", b"\xff\xfe"),
         GOOD.line().replace(b'"v": 1', b'"v": 2'),
-        GOOD.line().replace(b'"made"', b'"eaten"'),
-        GOOD.line().replace(b'"a.svg"', b"3"),
-        GOOD.line().replace(b'"key": "key"', b'"key": ""'),
-        GOOD.line().replace(b'{"psnr": 20.5, "bytes": 7}', b"[]"),
-        GOOD.line().replace(b'"made"', b'["made"]'),
+        GOOD.line().replace(b'"output": "a.svg", ', b""),
     ],
-    ids=map(str, range(14)),  # lines hold the time of day, which names of tests must not
+    ids=map(str, range(7)),  # lines hold the time of day, which names of tests must not
 )
 def test_invalid_lines_are_no_entries(line: bytes) -> None:
     assert entry_of(line) is None
-
-
-@pytest.mark.parametrize("value", [b'"7"', b"NaN", b"1e999", b"true", b"9" * 4000, b"[]", b"{}"])
-def test_figures_that_are_no_numbers_are_left_out(value: bytes) -> None:
-    entry = entry_of(GOOD.line().replace(b"20.5", value))
-    assert entry
-    assert entry.figures == {"bytes": 7}
-
-
-def test_an_error_is_one_line_that_commands_nothing() -> None:
-    line = GOOD.line().replace(b'"image"', b'"error": "one\\ntwo \\u001b[2J", "image"')
-    entry = entry_of(line)
-    assert entry
-    assert entry.error.isprintable()
-    assert entry.error.startswith("one")
 
 
 def test_a_manifest_must_be_a_regular_file(tmp_path: Path) -> None:

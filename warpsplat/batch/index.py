@@ -7,13 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpsplat.batch.manifest import NUMBERS, Manifest
+from warpsplat.batch.manifest import Manifest
 from warpsplat.batch.plan import BatchJob
 from warpsplat.batch.reports import Reports
 from warpsplat.batch.run import JobOutcome
 from warpsplat.errors import printable
 from warpsplat.files.output import write_result
 from warpsplat.files.remote import is_remote
+
+NUMBERS = ("psnr", "bytes", "shapes", "seconds")
+"""Figures that sums are made of or images sorted by."""
 
 
 def write_index(

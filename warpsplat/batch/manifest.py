@@ -19,9 +19,9 @@ import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from warpsplat.errors import OutputError, UsageError, cause_of, printable
+from warpsplat.errors import OutputError, UsageError, cause_of
 from warpsplat.files.remote import is_remote
 
 try:
@@ -33,12 +33,6 @@ LOCK, TRY_LOCK, UNLOCK = (fcntl.LOCK_EX, fcntl.LOCK_EX | fcntl.LOCK_NB, fcntl.LO
 
 NAME = "warpsplat-manifest.jsonl"
 """Default name, in the folder of the results."""
-
-MAX_LINE = 1 << 16
-"""Longest line that is read [bytes]."""
-
-MAX_FILE = 1 << 30
-"""Largest manifest [bytes]: 100,000 images take 60 MB."""
 
 FIRST_LOCK = 1 << 40
 """First of the bytes that stand for claims; there are as many. It is itself the lock of the file's end."""
@@ -70,31 +64,15 @@ class Entry:
 
 
 def entry_of(line: bytes) -> Entry | None:
-    """Parse a line; return None if it is damaged, of a later version, or something else."""
-    if len(line) > MAX_LINE:
-        return None
+    """Parse a line; return None if it is damaged or of a later version."""
     try:
         values = json.loads(line)
-        if values["v"] != 1 or values["event"] not in get_args(Event):
+        if values.pop("v") != 1:
             return None
-        texts = {name: values.get(name, "") for name in ("output", "key", "digest", "image", "error")}
-        figures = {name: value for name, value in values.get("figures", {}).items() if _is_valid(name, value)}
-        if not (all(isinstance(text, str) for text in texts.values()) and texts["output"] and texts["key"]):
-            return None
-        texts["error"] = printable(texts["error"])  # it is shown, whoever wrote it
-        return Entry(event=values["event"], figures=figures, **texts)
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+        del values["time"]
+        return Entry(**values)
+    except (ValueError, TypeError, LookupError, AttributeError):
         return None
-
-
-NUMBERS = ("psnr", "bytes", "shapes", "seconds")
-"""Figures that sums are made of or images sorted by."""
-
-
-def _is_valid(name: str, value: Any) -> bool:
-    """Return whether a figure is a number, and no integer of a million digits, if it has to be."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return name not in NUMBERS or (is_number and abs(value) < 1e15)
 
 
 def digest(data: bytes) -> str:
@@ -120,7 +98,7 @@ class Manifest:
         """Read the file if it exists; with ``write``, create it. May be called again, to write as well.
 
         Raises:
-            UsageError: it is no file, too large, or cannot be read or created.
+            UsageError: it is no file, or cannot be read or created.
         """
         flags = (os.O_RDWR | os.O_CREAT | os.O_APPEND) if write else os.O_RDONLY
         try:
@@ -135,11 +113,9 @@ class Manifest:
         except (OSError, ValueError) as error:
             cause = f"cannot be opened: {cause_of(error)}; --manifest FILE names another place"
             raise UsageError(f"manifest {self.path}: {cause}") from error
-        found = os.fstat(handle)
-        if not stat.S_ISREG(found.st_mode) or found.st_size > MAX_FILE:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
             os.close(handle)
-            cause = f"larger than {MAX_FILE >> 20} MiB" if stat.S_ISREG(found.st_mode) else "not a file"
-            raise UsageError(f"manifest {self.path}: is {cause}; --manifest FILE names another one")
+            raise UsageError(f"manifest {self.path}: is not a file; --manifest FILE names another one")
         self.close()
         self._handle = handle
         self.refresh()
