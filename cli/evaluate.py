@@ -10,16 +10,16 @@ import click
 
 from warpsplat.cli.echo import echo
 from warpsplat.cli.hooks import Done, Hooks, hook_options
-from warpsplat.cli.options import INPUT, Request, overwrite_option
+from warpsplat.cli.options import INPUT, Request, json_option, overwrite_option
 from warpsplat.errors import UsageError
 
 
-@click.command("eval", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("eval")
 @click.argument("image", type=INPUT)
 @click.argument("svg", type=INPUT)
 @hook_options("eval")
 @overwrite_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def command(image: Path, svg: Path, **given: Any) -> None:
     """Compare any SVG, as a viewer shows it, with IMAGE.
 

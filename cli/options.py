@@ -79,6 +79,9 @@ overwrite_option = option_in(
 )
 
 
+json_option = option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+
+
 def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
     """Return a decorator that adds options, in the order of the help."""
 
@@ -218,11 +221,6 @@ def quality_options(*, several: bool = False, refine: bool = False) -> Callable[
     ``several``: see ``flag``.
     """
     return together(*(flag(option, several=several) for option in OPTIONS if option.refine or not refine))
-
-
-def option_called(name: str) -> Callable[[Function], Function]:
-    """Return the flag of one option in the table."""
-    return flag(next(option for option in OPTIONS if option.name == name))
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from warpsplat.cli.options import (
     OUTPUT,
     Request,
     checkpoint_options,
+    json_option,
     overwrite_option,
     quality_options,
     run_options,
@@ -26,7 +27,7 @@ from warpsplat.files.remote import is_remote
 from warpsplat.fit.settings import make_settings
 
 
-@click.command("refine", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("refine", cls=HookedCommand)
 @click.argument("svg", type=INPUT)
 @click.argument("image", type=INPUT)
 @option_in(
@@ -66,7 +67,7 @@ from warpsplat.fit.settings import make_settings
 @checkpoint_options
 @hook_options("refine")
 @run_options
-@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@json_option
 def command(
     svg: Path,
     image: Path,

@@ -13,7 +13,7 @@ from warpsplat.cli.options import (
     OUTPUT,
     Request,
     device_option,
-    option_called,
+    flag,
     overwrite_option,
     quiet_option,
     threads_option,
@@ -21,9 +21,10 @@ from warpsplat.cli.options import (
 from warpsplat.errors import ImageError, UsageError
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.settings import DxfCurves
+from warpsplat.run.options import BY_NAME
 
 
-@click.command("render", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("render")
 @click.argument("svg", type=INPUT)
 @click.option(
     "-o",
@@ -33,7 +34,7 @@ from warpsplat.fit.settings import DxfCurves
     "[default: SVG with .png, here]",
 )
 @overwrite_option
-@option_called("dxf")
+@flag(BY_NAME["dxf"])
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Magnification.")
 @click.option(
     "--renderer",

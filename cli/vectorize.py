@@ -16,6 +16,7 @@ from warpsplat.cli.options import (
     Request,
     checkpoint_options,
     importance_option,
+    json_option,
     overwrite_option,
     preset_option,
     quality_options,
@@ -27,7 +28,7 @@ from warpsplat.extensions import declared, load
 from warpsplat.run.options import settings_from, with_preset
 
 
-@click.command("vectorize", cls=HookedCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("vectorize", cls=HookedCommand)
 @click.argument("images", type=INPUT, nargs=-1, required=True, metavar="IMAGE...")
 @option_in(
     "Files",
@@ -52,7 +53,7 @@ from warpsplat.run.options import settings_from, with_preset
     is_flag=True,
     help="Print the SVG as a data URI; the figures go to stderr.",
 )
-@option_in("Run", "--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@json_option
 @suggest_option
 def command(
     images: tuple[Path, ...],

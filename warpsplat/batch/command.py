@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from warpsplat.cli.signals import Interrupt
 
 
-@click.command("batch", cls=GroupedCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("batch", cls=GroupedCommand)
 @click.argument("inputs", type=click.Path(readable=False), nargs=-1, required=True, metavar="INPUT...")
 @batch_options
 def command(inputs: tuple[str, ...], sets: tuple[str, ...], verbose: int, **given: Any) -> None:

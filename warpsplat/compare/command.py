@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import INPUT, flag, overwrite_option, run_options
+from warpsplat.cli.options import (
+    INPUT,
+    Numbers,
+    Request,
+    flag,
+    json_option,
+    overwrite_option,
+    run_options,
+)
 from warpsplat.compare.tracer import TRACERS
-from warpsplat.errors import Stopped, UsageError, printable, shown
+from warpsplat.errors import Stopped, UsageError, printable
 from warpsplat.run.options import BY_NAME, settings_from
 
 if TYPE_CHECKING:
@@ -26,18 +34,6 @@ if TYPE_CHECKING:
 
 TABLES, FIGURES = "comparison.md", "comparison.json"
 """Files in the folder besides the SVGs."""
-
-
-def parse_curves(text: str) -> list[int]:
-    """Parse ``64,256`` as [64, 256], sorted, without duplicates.
-
-    Raises:
-        UsageError: not whole numbers.
-    """
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isascii() and part.isdigit() and len(part) < 9 for part in parts):
-        raise UsageError(f"not numbers of shapes: {shown(text)}; write 64,256,512")
-    return sorted({int(part) for part in parts})
 
 
 def svg_name(image: Path, program: str, setting: str) -> str:
@@ -86,7 +82,7 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
     return found
 
 
-@click.command("compare", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("compare")
 @click.argument("images", nargs=-1, required=True, type=INPUT)
 @click.option("--against", type=click.Choice(list(TRACERS)), required=True, help="The other program.")
 @click.option(
@@ -98,7 +94,12 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
 )
 @overwrite_option
 @click.option(
-    "--curves", default="64,256,512", show_default=True, metavar="N,N...", help="Numbers of shapes."
+    "--curves",
+    type=Numbers(several=True),
+    default="64,256,512",
+    show_default=True,
+    metavar="N,N...",
+    help="Numbers of shapes.",
 )
 @flag(BY_NAME["closed"])
 @flag(BY_NAME["open"])
@@ -106,20 +107,8 @@ def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
 @flag(BY_NAME["iterations"])
 @flag(BY_NAME["seed"])
 @run_options
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(
-    images: tuple[Path, ...],
-    against: str,
-    output: Path | None,
-    overwrite: bool,
-    curves: str,
-    device: str,
-    threads: int | None,
-    verbose: int,
-    quiet: bool,
-    as_json: bool,
-    **given: Any,
-) -> None:
+@json_option
+def command(images: tuple[Path, ...], against: str, curves: int | tuple[int, ...], **given: Any) -> None:
     """Compare our files of IMAGES with those of another program.
 
     Each image is vectorized by us with several numbers of shapes (for
@@ -130,13 +119,14 @@ def command(
 
     VTracer must be installed.
     """
-    settings = [settings_from({**given, "curves": n}) for n in parse_curves(curves)]
-    tracer = TRACERS[against]()
+    request = Request.taken(images[0], given)
+    numbers = curves if isinstance(curves, tuple) else (curves,)
+    settings = [settings_from({**given, "curves": n}) for n in sorted({*numbers})]
+    tracer, output = TRACERS[against](), request.output
     sources = read_images(images)
     if output:
-        prepare_folder(output, images, settings, tracer, overwrite=overwrite)
-    from warpsplat.cli.run import progress_bar
-    from warpsplat.cli.signals import Interrupt
+        prepare_folder(output, images, settings, tracer, overwrite=request.overwrite)
+    from warpsplat.cli.run import watched
     from warpsplat.compare.comparison import Comparison, compare, warm_up
     from warpsplat.files.output import write_result
     from warpsplat.files.sources import image_of
@@ -147,43 +137,41 @@ def command(
     from warpsplat.run.vectorize import make_result
 
     start_warp()
-    backend = Backend.on(choose_device(device), threads)
-    interrupt = Interrupt()
+    backend = Backend.on(choose_device(request.device), request.threads)
 
     def run(path: Path, target: FloatArray, ours: Settings, write: Callable[[str], None]) -> Result:
-        with interrupt.watching(), progress_bar(path, quiet=quiet, verbose=verbose) as on_progress:
+        with watched(request, path) as (report, stop):
             chosen, *_ = choose_subject(target, ours)
-            image = PreparedImage(Problem(target, chosen))
-            return make_result(image, Run(backend, on_progress, interrupt), write)
+            return make_result(PreparedImage(Problem(target, chosen)), Run(backend, report, stop), write)
 
     rows: list[ComparisonRow] = []
     try:
         warm_up(settings[0], backend)
         for path, data in sources.items():
-            name = printable(path.name)
-            for row in compare(name, image_of(data, paper=1.0), settings, tracer, partial(run, path)):
+            target, name = image_of(data, paper=1.0), printable(path.name)
+            for row in compare(name, target, settings, tracer, partial(run, path)):
                 rows.append(row)
                 if output and row.svg:
                     write_result(output / svg_name(path, row.program, row.setting), row.svg.encode())
-                if verbose:
+                if request.verbose:
                     echo(f"{row.image}: {row.program}, {row.setting}: {row.seconds:.1f} s", err=True)
     except Stopped as error:
         raise KeyboardInterrupt from error
     finally:
         if rows:  # also after a failure
-            publish(Comparison(rows, settings[0], tracer), output, as_json=as_json, quiet=quiet)
+            publish(Comparison(rows, settings[0], tracer), request)
 
 
-def publish(found: Comparison, output: Path | None, *, as_json: bool, quiet: bool) -> None:
+def publish(found: Comparison, request: Request) -> None:
     """Write tables and figures into the folder, and print one of them."""
     from warpsplat.compare.tables import markdown
     from warpsplat.files.output import write_result
 
     tables, figures = markdown(found), json.dumps(found.as_dict())
-    if output:
-        write_result(output / TABLES, f"{tables}\n".encode())
-        write_result(output / FIGURES, f"{figures}\n".encode())
-    if as_json:
+    if request.output:
+        write_result(request.output / TABLES, f"{tables}\n".encode())
+        write_result(request.output / FIGURES, f"{figures}\n".encode())
+    if request.as_json:
         echo(figures)
-    elif not quiet:
+    elif not request.quiet:
         echo(tables)

@@ -25,7 +25,7 @@ FLATPAK = ".var"
 """Folder of Flatpak's programs, in the path of their settings."""
 
 
-@click.command("inkscape", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("inkscape")
 @click.option(
     "--folder",
     type=OUTPUT,

@@ -15,7 +15,7 @@ from warpsplat.errors import UsageError
 from warpsplat.pages.serve.runs import Limits
 
 
-@click.command("serve", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("serve")
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import device_option, threads_option
+from warpsplat.cli.options import device_option, json_option, threads_option
 from warpsplat.errors import UsageError, counted, shown
 from warpsplat.extensions import renderer_names
 
@@ -56,7 +56,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
     )
 
 
-@click.command("bench", context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
+@click.command("bench", context_settings={"show_default": True})
 @click.option("--curves", type=click.IntRange(1, 100_000), default=512, metavar="N", help="Number of shapes.")
 @click.option("--size", default="768x512", metavar="WxH", help="Size of the canvas [px].")
 @click.option("--kind", type=click.Choice(["closed", "open"]), default="closed", help="Fills or strokes.")
@@ -88,7 +88,7 @@ def table(values: dict[str, Any], verbose: int) -> str:
 )
 @click.option("--torch", "through_torch", is_flag=True, help="Also time the passes through PyTorch.")
 @click.option("-v", "--verbose", count=True, show_default=False, help="Also list the kernels.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def command(size: str, device: str, threads: int | None, verbose: int, as_json: bool, **options: Any) -> None:
     """Time a training step and its stages on a random scene.
 

@@ -9,13 +9,13 @@ from typing import Any
 import click
 
 from warpsplat.cli.echo import echo
-from warpsplat.cli.options import device_option
+from warpsplat.cli.options import device_option, json_option
 from warpsplat.errors import ExitCode
 
 
-@click.command("doctor", context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("doctor")
 @device_option(default="auto", show_default=True, help="Where the self-test runs: auto, cpu, or cuda:N.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def command(device: str, as_json: bool) -> None:
     """Check that everything a run needs is installed and works.
 
@@ -41,8 +41,8 @@ def command(device: str, as_json: bool) -> None:
         sys.exit(ExitCode.RESOURCES)
 
 
-@click.command("info", context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.command("info")
+@json_option
 def info(as_json: bool) -> None:
     """Show the version, the devices and the folder of compiled kernels; doctor checks them."""
     from warpsplat.tools.doctor import check_cache, check_devices, check_machine, check_packages, check_python
