@@ -31,9 +31,7 @@ def open_standard_streams() -> None:
 def echo(text: str, *, err: bool = False) -> None:
     """Print lines with control characters escaped. Errors in writing to stderr are ignored.
 
-    Raises:
-        OutputError: stdout cannot be written.
-        BrokenPipeError: the reader of stdout has gone.
+    Raises ``OutputError`` if stdout cannot be written, ``BrokenPipeError`` if its reader has gone.
     """
     text = "\n".join(printable(line) for line in text.split("\n"))
     try:

@@ -65,9 +65,7 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command and its arguments; an image in place of a command is vectorized.
 
-        Raises:
-            click.UsageError: an unknown command; the message suggests one.
-            ImageError: a missing file.
+        Raises ``click.UsageError`` for an unknown command, ``ImageError`` for a missing file.
         """
         name = args[0]
         if name in COMMANDS or ctx.resilient_parsing:
@@ -168,10 +166,7 @@ def json_stream(arguments: list[str]) -> Literal["stdout", "stderr"] | None:
 
 
 def report_error(error: BaseException, objects: Literal["stdout", "stderr"] | None = None) -> int:
-    """Print an exception, and return the exit code for it.
-
-    ``objects``: where to print it as a JSON object too.
-    """
+    """Print an exception, also as a JSON object if ``objects`` says where, and return its exit code."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message())
         return ExitCode.USAGE

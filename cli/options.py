@@ -216,10 +216,7 @@ def flag(option: Option, *, several: bool = False) -> Callable[[Function], Funct
 
 
 def quality_options(*, several: bool = False, refine: bool = False) -> Callable[[Function], Function]:
-    """Return a decorator that adds the options that decide the result, or those of them that ``refine`` has.
-
-    ``several``: see ``flag``.
-    """
+    """Return a decorator that adds the options that decide the result, or those that ``refine`` has."""
     return together(*(flag(option, several=several) for option in OPTIONS if option.refine or not refine))
 
 
@@ -247,8 +244,7 @@ class Request:
     def output_for(self, source: Path, ending: str) -> Path:
         """Return the output, or the name of ``source`` with another ending, in the current folder.
 
-        Raises:
-            UsageError: there is no output, and the source is the standard input.
+        Raises ``UsageError`` if there is no output, and the source is the standard input.
         """
         if self.output is None and source == STANDARD:
             raise UsageError(f"the standard input has no name: give -o FILE{ending}, or -o -")
@@ -256,11 +252,7 @@ class Request:
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """Return the files that are read.
-
-        Raises:
-            UsageError: more than one of them is the standard input.
-        """
+        """Return the files that are read; raise ``UsageError`` if two of them are the standard input."""
         if self.image == self.importance == STANDARD:
             raise UsageError("only one of image and mask can come from the standard input")
         return (self.image,) if self.importance is None else (self.image, self.importance)

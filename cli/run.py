@@ -83,10 +83,8 @@ def watched(
 ) -> Iterator[tuple[Callable[[Progress], None], Interrupt]]:
     """Yield the progress callback of a run on the file ``source``, and its stop callback, Ctrl-C.
 
-    With ``-v``, print first which ``shapes`` are about to be made, if given, and on which device.
-
-    Raises:
-        UsageError: an unknown device is found before a bar is shown.
+    With ``-v``, print first which ``shapes`` are about to be made, if given, and on which device. An unknown
+    device raises ``UsageError`` before a bar is shown.
     """
     told = shapes and request.verbose
     if told or request.device not in ALWAYS_THERE:
@@ -132,9 +130,7 @@ def echo_unused_dxf(dxf: str | None, output: Path) -> None:
 
 
 def echo_exceptions(name: str, result: Result) -> None:
-    """Print what the run noted, which elements were kept, how the image was reduced, and how many shapes were
-    reset, if any.
-    """
+    """Print the notes of a run, what was kept, how the image was reduced, and whether shapes were reset."""
     reset = f"shapes with numbers that are not finite were reset, {counted(result.renewed, 'time')}"
     notes = (
         *result.notes,

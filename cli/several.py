@@ -72,8 +72,7 @@ def make_several(request: Request, numbers: Sequence[int], given: dict[str, Any]
 def named(image: Path, output: Path | None, numbers: Sequence[int], settings: Settings) -> list[Path]:
     """Return the file of each number: ``photo-50.svg`` here, in the given folder, or by the given pattern.
 
-    Raises:
-        UsageError: two files would have one name, or one could not be written.
+    Raises ``UsageError`` if two files would have one name, or one could not be written.
     """
     if STANDARD in (output, image) and (output is None or output == STANDARD):
         raise UsageError("several numbers of shapes make several files: give -o 'NAME-{curves}.svg'")

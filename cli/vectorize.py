@@ -118,13 +118,7 @@ def single(
 ) -> None:
     """Make a file of one image, and whatever hooks add.
 
-    Args:
-        request: Image, output and how to run.
-        given: Options, those of the preset included.
-        hooks: What else is made of the run.
-        keeping: The arguments of ``warpsplat.vectorize`` for checkpoints.
-        preset: Its name, for the command in a report.
-        as_uri: Whether the file is printed as a data URI.
+    ``given``: options, those of ``preset`` included; ``keeping``: those of ``vectorize`` for checkpoints.
     """
     from warpsplat.files.inputs import STANDARD, read_input
     from warpsplat.files.output import SVG_ENDINGS

@@ -84,11 +84,7 @@ def renderer_names() -> tuple[str, ...]:
 
 
 def load_renderer(name: str) -> Any:
-    """Return the ``fit.renderers.FitRenderer`` of a name.
-
-    Raises:
-        UsageError: there is none of that name.
-    """
+    """Return the ``fit.renderers.FitRenderer`` of a name; raise ``UsageError`` if there is none."""
     if name not in renderer_names():
         raise UsageError(f"renderer must be one of {', '.join(renderer_names())}, not {shown(name)}")
     return load({"exact": "warpsplat.fit.renderers:EXACT", **declared("renderers")}[name])

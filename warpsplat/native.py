@@ -75,11 +75,7 @@ def discard_output(descriptor: int) -> None:
 
 
 def write_message(text: str) -> None:
-    """Write to the standard error as it is, or was before it was hidden.
-
-    Raises:
-        OSError: it takes no more.
-    """
+    """Write to the standard error as it is, or was before it was hidden; raise ``OSError`` if that fails."""
     with _lock:
         os.write(_saved if _hiding and _saved >= 0 else 2, text.encode(errors="backslashreplace"))
 

@@ -59,10 +59,7 @@ def vectorize_images(
 ) -> None:
     """Make an SVG of each image, in the folder that ``request`` has as its output, or here.
 
-    ``given``: settings; ``hooked``: the options of hooks, as the command line has them.
-
-    Raises:
-        UsageError: an option that takes one image only.
+    ``given``: settings; ``hooked``: options of hooks. Raises ``UsageError`` for what takes one image only.
     """
     from warpsplat.run.names import is_pattern
 
@@ -98,11 +95,7 @@ def flags_of(given: Mapping[str, Any]) -> dict[str, Any]:
 def perform(
     inputs: Sequence[str], flags: Mapping[str, Any], sets: Sequence[str], options: BatchOptions
 ) -> None:
-    """Do a batch, and exit with the code for failures or missed goals, if there are any.
-
-    Raises:
-        WarpsplatError: the batch as a whole cannot be done.
-    """
+    """Do a batch, and exit with the code for failures or missed goals, if there are any."""
     from warpsplat.batch.display import BatchDisplay
     from warpsplat.batch.index import write_index
     from warpsplat.batch.layers import command_layer
@@ -160,11 +153,7 @@ def perform(
 def executor_for(
     jobs: Sequence[BatchJob], options: BatchOptions, interrupt: Interrupt
 ) -> tuple[Executor, int | None]:
-    """Return the executor of the jobs, and the threads of each.
-
-    Raises:
-        UsageError: an unknown device or executor, an invalid number of GPUs, or Ray is not installed.
-    """
+    """Return the executor of the jobs, and the threads of each; raise ``UsageError`` if there can be none."""
     executor, gpus = options.executor, options.gpus
     name, _, address = (executor or "").partition("=")
     if executor is not None and name != "ray":

@@ -19,12 +19,9 @@ ENDINGS = (
 
 
 def find_images(name: str, base: Path) -> list[FoundImage]:
-    """Return the images that ``name`` means, relative to ``base``, sorted.
+    """Return the images that ``name`` means, relative to ``base``, sorted; ``UsageError`` if there are none.
 
     A single file is returned even if it is missing: then only that image fails.
-
-    Raises:
-        UsageError: nothing is found, or ``name`` is no usable pattern.
     """
     try:
         found = list(_found(name, base))

@@ -22,11 +22,7 @@ NUMBERS = ("psnr", "bytes", "shapes", "seconds")
 def write_index(
     reports: Reports, jobs: Sequence[BatchJob], outcomes: Mapping[Path, JobOutcome], manifest: Manifest
 ) -> None:
-    """Write the list of ``jobs``, also those that other processes do; ``outcomes``: of this run, by output.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """Write the list of ``jobs``, also of other processes; ``outcomes``: of this run, by output."""
     from warpsplat.pages.environment import page
 
     rows = [_row(reports, job, *_state(job, outcomes.get(job.output), manifest)) for job in jobs]

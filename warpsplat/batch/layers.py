@@ -119,8 +119,7 @@ def _check_kinds(layer: Layer) -> None:
 def assigned(text: str) -> tuple[str, Any]:
     """Parse ``--set``: ``key=value``, or ``rates.points=0.5`` for a key in a mapping, with a YAML value.
 
-    Raises:
-        UsageError: it has another form, or an unknown key.
+    Raises ``UsageError`` for another form, or an unknown key.
     """
     name, found, written = text.partition("=")
     key, dot, inner = name.partition(".")
@@ -137,14 +136,9 @@ def assigned(text: str) -> tuple[str, Any]:
 
 
 def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, GivenValue]:
-    """Return the layer of the command line.
+    """Return the layer of the command line: values by key, None for not given, and those of ``--set``.
 
-    Args:
-        flags: values by key; None: not given.
-        sets: values of ``--set``.
-
-    Raises:
-        UsageError: a value is out of range, or a key has two values.
+    Raises ``UsageError`` if a value is out of range, or a key has two values.
     """
     layer: dict[str, GivenValue] = {}
     for key, value in flags.items():

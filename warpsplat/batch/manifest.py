@@ -97,8 +97,7 @@ class Manifest:
     def open(self, *, write: bool = True) -> None:
         """Read the file if it exists; with ``write``, create it. May be called again, to write as well.
 
-        Raises:
-            UsageError: it is no file, or cannot be read or created.
+        Raises ``UsageError`` if it is no file, or cannot be read or created.
         """
         flags = (os.O_RDWR | os.O_CREAT | os.O_APPEND) if write else os.O_RDONLY
         try:
@@ -157,11 +156,7 @@ class Manifest:
         return [entry for line in self._lines.get(self.name(output), ()) if (entry := entry_of(line))]
 
     def append(self, entry: Entry) -> None:
-        """Add a line in one write.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Add a line in one write; raise ``OutputError`` if it cannot be written."""
         assert self._handle is not None, "open"
         try:
             self._lock(LOCK)
@@ -189,11 +184,7 @@ class Manifest:
             fcntl.lockf(self._handle, operation, 1, byte)
 
     def claim(self, output: Path, key: str) -> bool:
-        """Claim a result; return False if another process has.
-
-        Raises:
-            OutputError: the file system has no locks.
-        """
+        """Claim a result; return False if another process has. Without locks, raise ``OutputError``."""
         try:
             self._lock(TRY_LOCK, self._byte(output, key))
         except (BlockingIOError, PermissionError):

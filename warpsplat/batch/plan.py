@@ -77,14 +77,9 @@ PlannedJob = tuple[ResultRequest, BatchJob]
 
 
 def plan_jobs(inputs: Sequence[str], command: Layer | None = None) -> list[BatchJob]:
-    """Return the jobs of batch files, images, folders and patterns.
+    """Return the jobs of batch files, images, folders and patterns, over which ``command`` has settings.
 
-    Args:
-        inputs: their names.
-        command: settings of the command line, see ``layers.command_layer``.
-
-    Raises:
-        UsageError: anything is wrong with them; the message names the line and key of a batch file.
+    Raises ``UsageError`` if anything is wrong with them; the message names the line and key of a batch file.
     """
     planned: list[PlannedJob] = []
     named: dict[Path, FoundImage] = {}

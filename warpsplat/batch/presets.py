@@ -28,8 +28,7 @@ def preset_names() -> list[str]:
 def preset_layer(preset: str) -> Layer:
     """Return the settings of a preset: a name, or the path of a YAML file.
 
-    Raises:
-        UsageError: there is no such preset, or its file has a mistake; the message names the line.
+    Raises ``UsageError`` for an unknown preset, and for a mistake in its file, with the line.
     """
     path = Path(preset)
     if path.suffix.lower() not in ENDINGS:

@@ -35,11 +35,9 @@ class Reports:
 
     @staticmethod
     def at(place: Path, home: Path, *, taken: Iterable[Path] = (), overwrite: bool) -> Reports:
-        """Return pages in a folder, or with the given list; ``taken``: other files of the batch.
+        """Return pages in a folder, or with the given list, which must be none of the files ``taken``.
 
-        Raises:
-            UsageError: the list cannot be written, or is one of these files.
-            OutputError: the folder cannot be made.
+        Raises ``UsageError`` or ``OutputError`` if they cannot be written.
         """
         index = place if place.suffix.lower() in (".html", ".htm") else place / "index.html"
         if os.path.realpath(place) in {os.path.realpath(path) for path in taken if not is_remote(path)}:

@@ -74,11 +74,7 @@ def marked_key(data: bytes) -> str:
 
 
 def check_replaceable(jobs: Iterable[BatchJob], manifest: Manifest) -> None:
-    """Check that no result replaces a file that warpsplat did not write.
-
-    Raises:
-        UsageError: there are such files; the message names them.
-    """
+    """Raise ``UsageError`` if a result would replace a file that warpsplat did not write."""
     found = [job.output for job in jobs if not _may_replace(job.output, manifest)]
     if found:
         names = ", ".join(map(str, found[:MOST_NAMES])) + (", ..." if len(found) > MOST_NAMES else "")

@@ -63,13 +63,9 @@ class Batch:
         threads: int | None = None,
         reports: Reports | None = None,
     ) -> None:
-        """Args:
-        jobs: the jobs.
-        manifest: an open manifest.
-        on_outcome: called with the outcome of each job as soon as it is known.
-        retry: whether jobs that failed are tried again.
-        threads: number of threads for each task on a CPU.
-        reports: where pages on results are kept; None: none are made.
+        """Prepare to do jobs, with an open manifest; ``on_outcome`` is called as soon as an outcome is known.
+
+        ``retry``: whether jobs that failed are tried again; ``threads``: for each task on a CPU.
         """
         self.jobs, self.manifest = jobs, manifest
         self._on_outcome, self._retry, self._threads = on_outcome, retry, threads
@@ -79,9 +75,7 @@ class Batch:
     def run(self, executor: Executor, stop: Stop, on_progress: OnProgress) -> None:
         """Do the jobs. Wait for those claimed by another process, and do them if it dies.
 
-        Raises:
-            OutputError: the manifest cannot be written.
-            ResourceError: there are no workers.
+        Raises ``OutputError`` if the manifest cannot be written, ``ResourceError`` if there are no workers.
         """
         todo, waiting = list(range(len(self.jobs))), False
         while todo and not stop():

@@ -44,11 +44,7 @@ def svg_name(image: Path, program: str, setting: str) -> str:
 def prepare_folder(
     folder: Path, images: Sequence[Path], settings: Sequence[Settings], tracer: Tracer, *, overwrite: bool
 ) -> None:
-    """Make the folder of the results, and check that they can be written.
-
-    Raises:
-        UsageError: they cannot, or exist and ``overwrite`` is not given.
-    """
+    """Make the folder of the results; raise ``UsageError`` if they exist or cannot be written."""
     from warpsplat.compare.comparison import OURS
     from warpsplat.files.output import check_output
 
@@ -64,12 +60,7 @@ def prepare_folder(
 
 
 def read_images(images: Sequence[Path]) -> dict[Path, bytes]:
-    """Read all images, before the run.
-
-    Raises:
-        ImageError: one cannot be read.
-        UsageError: two images have the same name.
-    """
+    """Read all images, before the run; raise ``UsageError`` if two have the same name."""
     from warpsplat.files.inputs import input_name, read_input
     from warpsplat.files.sources import image_of
 

@@ -80,17 +80,9 @@ class Comparison:
 def compare(
     image: str, target: FloatArray, settings: Sequence[Settings], tracer: Tracer, make: Maker
 ) -> Iterator[ComparisonRow]:
-    """Vectorize an image by each of our settings, then by each of the tracer's.
+    """Vectorize an image by each of our settings, then by each of the tracer's; may raise ``Stopped``.
 
-    Args:
-        image: its name.
-        target: sRGB in [0, 1], (height, width, 3); the tracer gets its 8 bits.
-        settings: ours.
-        tracer: the other program.
-        make: makes our files.
-
-    Raises:
-        Stopped: a run of ours was interrupted.
+    ``target``: sRGB in [0, 1], (height, width, 3); the tracer gets its 8 bits. ``make`` makes our files.
     """
     for ours in settings:
         yield our_row(image, target, ours, make)

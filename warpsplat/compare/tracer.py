@@ -46,11 +46,7 @@ INSTALL = "pip install 'vtracer>=1.0.0a4'"
 
 
 def vtracer() -> Tracer:
-    """Return VTracer (visioncortex), by its Python package.
-
-    Raises:
-        UsageError: it is not installed, or older than 1.0; the message says how to install it.
-    """
+    """Return VTracer (visioncortex), by its Python package; raise ``UsageError`` unless that is installed."""
     try:
         import vtracer as package
     except ImportError as error:

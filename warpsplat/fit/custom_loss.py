@@ -133,8 +133,7 @@ class Evaluation(NamedTuple):
 def evaluate(function: LossFunction, image: FloatArray, *target: FloatArray) -> Evaluation:
     """Return a loss, as ``CustomLoss.on`` gives it, at an image, and with a target if it takes one.
 
-    Raises:
-        UsageError: it raises an error, or returns anything but a finite value and a finite gradient.
+    Raises ``UsageError`` if it raises an error, or returns anything but a finite value and gradient.
     """
     try:
         found = function(image, *target)

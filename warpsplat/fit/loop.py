@@ -31,13 +31,9 @@ class Event(NamedTuple):
 def fit(
     problem: Problem, run: Run, start: Start | None = None, rounding: Rounding | None = USUAL_ROUNDING
 ) -> Fit:
-    """Optimise shapes against an image.
+    """Optimise shapes against an image, or continue from the run's checkpoint.
 
-    Args:
-        problem: the image and settings.
-        run: how the work is carried out. If its ``checkpoint`` holds this fit, it continues from there.
-        start: shapes to start from.
-        rounding: how coordinates are rounded; None: no file is made of the result, nothing is rounded.
+    ``start``: shapes to start from; ``rounding``: how coordinates are rounded, None if there is no file.
     """
     training = Training(problem, run, start or Start(), rounding)
     checkpoint = run.checkpoint
@@ -57,10 +53,7 @@ def fit(
 
 
 def train(training: Training) -> Fit:
-    """Make the steps of a fit, and return its result.
-
-    All else that happens is an event, except for checkpoints and the question whether to stop.
-    """
+    """Make the steps of a fit, and return its result. All that happens between steps is an event."""
     run, checkpoint = training.run, training.run.checkpoint
     training.begin()
     while True:

@@ -153,12 +153,10 @@ class RampSolver:
         """Best flat colour, (shape, 3)."""
 
     def _steepest(self, size: int) -> tuple[Floats, Floats, Floats]:
-        """Return the best change of colour along one line that is linear in the first ``size`` of x, y,
-        x^2 + y^2.
+        """Return the best change of colour along a line, linear in the first ``size`` of x, y, x^2 + y^2.
 
-        Returns:
-            coefficients of the position along the line, shape (shape, size), in units of its standard
-            deviation; the colour of such a unit, shape (shape, 3); the gain, shape (shape,).
+        It is given by the coefficients of the position along the line, shape (shape, size), in units of its
+        standard deviation; the colour of such a unit, shape (shape, 3); and the gain, shape (shape,).
         """
         lower = linear.cholesky(self._spread[:, :size, :size])
         left, sizes, right = linear.svd(linear.solve(lower, self._slope[:, :size]))

@@ -48,13 +48,10 @@ def simplify(scene: Scene, worth: FloatArray, count: int) -> tuple[Scene, IndexA
 
 
 def without(points: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute splines without one of their points each.
+    """Return for every point of splines, shape (shape, point, 2), where its neighbours go if it is removed.
 
-    ``points``: shape (shape, point, 2). The ends of splines that are not ``closed`` stay where they are.
-
-    Returns:
-        for every point of every spline, where its two neighbours go if it is removed, shape
-        (shape, point, 2, 2), and the area that the outline then sweeps, shape (shape, point).
+    Their shape is (shape, point, 2, 2). Return also the area that the outline then sweeps, shape (shape,
+    point). The ends of splines that are not ``closed`` stay where they are.
     """
     count = points.shape[1]
     around = np.arange(count)[:, None] + np.arange(-3, 4)

@@ -79,12 +79,8 @@ class Step:
     ) -> None:
         """Allocate the renderers and record the launches.
 
-        Args:
-            state: shapes, moments and counters.
-            settings: of the run.
-            target: what to fit, at the size of the phase.
-            capacity: of the renderer's arrays; default: as much as a first render needs.
-            began: steps done when the step was first recorded, by which scheduled weights go; default: now.
+        ``capacity``: of the renderer's arrays; default: as much as a first render needs. ``began``: steps
+        done when the step was first recorded, by which scheduled weights go; default: now.
         """
         self.state, self.settings = state, settings
         self._aim(target, capacity, began)

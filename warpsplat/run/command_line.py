@@ -16,16 +16,10 @@ from warpsplat.run.options import KINDS, OPTIONS, with_preset
 def vectorize_command(
     settings: Settings, image: str, output: str, *further: str, preset: str | None = None
 ) -> str:
-    """Return the shortest command that makes ``output`` of ``image`` with ``settings``.
+    """Return the shortest command that makes ``output`` of ``image`` by ``settings``, with ``further`` words.
 
-    A comment follows if no command can, as with settings that only batch files have.
-
-    Args:
-        settings: the settings.
-        image: file name of the image.
-        output: file name of the result.
-        further: further words.
-        preset: one that the settings were made with: it may say what no flag does.
+    A comment follows if no command can, as with settings that only batch files have. ``preset``: one that the
+    settings were made with: it may say what no flag does.
     """
     choices = []
     for name in dict.fromkeys((preset, None)):
@@ -67,10 +61,7 @@ def as_path(name: str) -> str:
 
 
 def flags_of(settings: Settings, preset: str | None = None) -> tuple[Quality, dict[str, Any]]:
-    """Return the quality and the fewest other arguments of ``make_settings`` that give ``settings``.
-
-    ``preset``: one that is named as well.
-    """
+    """Return the quality and the fewest other arguments that, over a preset, give ``settings``."""
     choices = [(quality, _given(settings, quality, preset)) for quality in QUALITIES]
     exact = [one for one in choices if _settings(*one, preset) == settings]
     return min(exact or choices, key=lambda one: (len(one[1]), one[0] != DEFAULT_QUALITY))

@@ -88,10 +88,7 @@ def named_bytes(path: Path, text: str, *, key: str = "", zoom: float = 1.0, dxf:
 
 
 def write_named(path: Path, text: str, *, zoom: float = 1.0, dxf: DxfCurves = "arcs") -> None:
-    """Write ``named_bytes`` atomically; ``-`` is the standard output.
-
-    Raises its errors, ``UsageError`` for another ending, and ``OutputError`` if the file cannot be written.
-    """
+    """Write ``named_bytes`` atomically, or raise ``OutputError``; ``-`` is the standard output."""
     if path != STANDARD:
         check_ending(path, ENDINGS)
     write_result(path, named_bytes(path, text, zoom=zoom, dxf=dxf))

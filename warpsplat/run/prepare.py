@@ -75,11 +75,7 @@ def prepare(
 
     If ``keyed``, the file names the job that made it (``job_key``), by which batches recognise it: the
     source and the mask are files then. ``backend`` starts the device, whose memory counts if it is a GPU's.
-    Other arguments are those of ``vectorize``.
-
-    Raises:
-        ImageError: the image or the mask cannot be read, or their proportions differ.
-        ResourceError: the limit of memory is too low for any size.
+    Raises ``ImageError`` if a file cannot be read, ``ResourceError`` if there is no memory for any size.
     """
     name = name or source_name(source)
     mask_name = source_name(importance, "the mask")
@@ -205,10 +201,8 @@ def choose_subject(
 ) -> tuple[Settings, str, tuple[str, ...]]:
     """Return ``settings`` with a subject, the reason for it (empty if the subject was given), and notes.
 
-    ``Option.elsewhere`` decides about options that have no effect on the subject that is detected.
-
-    Raises:
-        UsageError: the subject is none that is fitted, by which a loss could go.
+    ``Option.elsewhere`` decides about options that have no effect on the subject that is detected. Raises
+    ``UsageError`` if there is a loss, and the subject is none that is fitted.
     """
     subject, why, notes = settings.subject, "", list[str]()
     if subject == "auto":

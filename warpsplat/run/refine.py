@@ -223,11 +223,7 @@ def _load(text: str, problem: Problem, name: str, *, keep: bool) -> tuple[KeptSc
 
 
 def _check_read(text: str, scene: Scene, has_background: bool) -> None:
-    """Compare pictures of the SVG and of the scene that was read: nothing may be lost unnoticed.
-
-    Raises:
-        ImageError: they differ.
-    """
+    """Raise ``ImageError`` if pictures of the SVG and of the scene that was read differ."""
     given = render_svg(text, size=(scene.canvas.width, scene.canvas.height))
     read = show(write_svg(scene, background=has_background), scene)
     if given.size != read.size:

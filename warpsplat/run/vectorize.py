@@ -125,11 +125,8 @@ def make_result(
     """Vectorize a prepared image, and score the file.
 
     ``write`` is called with the file before it is scored, so that no later failure can lose it. A ``start``
-    makes it a plain fit from these shapes, in place of the settings' strategy.
-
-    Raises:
-        ImageError: a problem with the image that shows only during the work.
-        DeviceError: the device failed; what could be saved is written, and the error's ``result``.
+    makes it a plain fit from these shapes, in place of the settings' strategy. Raises ``ImageError``, and
+    ``DeviceError`` if the device failed, whose ``result`` is what could be saved and is written.
     """
     begun, compiled, history = time.monotonic(), compile_seconds(), list[Progress]()
     checkpoint = run.checkpoint
@@ -184,8 +181,7 @@ def make_result(
 def _fitted(image: PreparedImage, run: Run, start: Start | None) -> tuple[PreparedImage, Strategy, Fit]:
     """Return what is made of an image; and that image, which may turn out to be another subject's.
 
-    Raises:
-        DeviceError: the device failed before there was anything to save.
+    Raises ``DeviceError`` if the device failed before there was anything to save.
     """
     while True:
         problem = image.problem

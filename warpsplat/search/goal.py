@@ -183,10 +183,9 @@ def _reaches(candidate: Candidate, settings: Settings) -> bool:
 
 
 def _rank(candidate: Candidate, settings: Settings) -> tuple[bool, bool, float]:
-    """Return a sort key, best first: by the limit, then by the target, then the smallest file.
+    """Return a sort key, best first: files within the limit, of these those that reach the target, by size.
 
-    Among files beyond the limit the smallest is best; among those that miss the target the one with the
-    highest PSNR.
+    Of those that miss it the one with the highest PSNR is best, beyond the limit the smallest.
     """
     if not _fits(candidate, settings):
         return True, True, candidate.size

@@ -38,11 +38,7 @@ class Side:
     device: str
 
     def run(self, *arguments: str) -> dict[str, Any]:
-        """Return what a command prints as JSON.
-
-        Raises:
-            UsageError: the command fails.
-        """
+        """Return what a command prints as JSON; raise ``UsageError`` if it fails."""
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         if self.folder is not None:
             environment["PYTHONPATH"] = self.folder
@@ -69,12 +65,8 @@ class Side:
 def sides(against: str, device: str) -> tuple[Side, Side]:
     """Return this warpsplat on ``device``, and what it is compared with.
 
-    Args:
-        against: another device; a folder with another copy of warpsplat; or another Python, for its own.
-        device: ``auto``, ``cpu`` or ``cuda:N``.
-
-    Raises:
-        UsageError: ``against`` is none of these.
+    ``against``: another device; a folder with another copy of warpsplat; or another Python, for its own.
+    Anything else raises ``UsageError``.
     """
     this = Side(sys.executable, HERE, device)
     if re.fullmatch(r"cpu|cuda(:\d+)?", against):
@@ -90,19 +82,10 @@ def sides(against: str, device: str) -> tuple[Side, Side]:
 
 
 def compare(both: Sequence[Side], options: Sequence[str], rounds: int) -> dict[str, Any]:
-    """Time ``rounds`` rounds of each side; who begins changes from round to round.
+    """Time ``rounds`` rounds of each side with ``options`` of bench; who begins changes from round to round.
 
-    Args:
-        both: the sides.
-        options: of ``warpsplat bench``, besides the device.
-        rounds: of each side.
-
-    Returns:
-        ``sides``: versions, device, and ``times`` [ms]: median, lowest, highest of the rounds' medians;
-        ``ratios``: the same of the second side's time over the first one's in the same round.
-
-    Raises:
-        UsageError: a side cannot be run.
+    Returns ``sides``: versions, device, and ``times`` [ms]: median, lowest, highest of the rounds' medians;
+    and ``ratios``: the same of the second side's time over the first one's in the same round.
     """
     found: list[list[dict[str, Any]]] = [[], []]
     for number in range(rounds):

@@ -77,11 +77,7 @@ def bench(
 ) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up. Nothing moves: all learning rates are 0.
 
-    Returns:
-        results of ``time_steps``, counts, memory and, with ``through_torch``, results of ``time_torch``.
-
-    Raises:
-        UsageError: see ``check_torch``, ``through_torch`` only.
+    Returns what ``time_steps`` does, counts, memory and, with ``through_torch``, what ``time_torch`` does.
     """
     if through_torch:
         check_torch(backend.device)
@@ -141,8 +137,7 @@ def passes_of(renderer: Renderer) -> Replay:
 def time_steps(step: Step, repeats: int) -> dict[str, Any]:
     """Time ``repeats`` steps after a warm-up: as a whole, as two passes, and launch by launch.
 
-    Returns:
-        summaries of ``step``, ``forward_backward``, and of all ``stages`` and ``kernels``.
+    Returns summaries of ``step``, ``forward_backward``, and of all ``stages`` and ``kernels``.
     """
     device, renderer = step.renderer.backend.device, step.renderer
     steps, passes, own_passes = [], [], passes_of(renderer)
@@ -183,9 +178,7 @@ def check_torch(device: wp.Device) -> None:
 def time_torch(own: Renderer, repeats: int) -> dict[str, Any]:
     """Time passes through PyTorch and the renderer's own alternately, ``repeats`` of each after a warm-up.
 
-    Returns:
-        summaries of ``own`` and ``torch``; ``ratio``, the median of PyTorch's time over the own time just
-        before.
+    Returns summaries of ``own`` and ``torch``, and the median ``ratio`` of PyTorch's time to the own one.
     """
     import torch
 

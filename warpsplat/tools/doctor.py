@@ -61,11 +61,7 @@ class Check:
 
 
 def checks(device: str = "auto") -> Iterator[Check]:
-    """Yield all checks, ordered so that the first failure explains later ones.
-
-    Args:
-        device: where the self-test runs.
-    """
+    """Yield all checks, in an order in which a failure explains later ones; ``device``: of the self-test."""
     tests: dict[str, Callable[[], Check]] = {
         "python": check_python,
         "packages": check_packages,

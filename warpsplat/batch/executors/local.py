@@ -17,16 +17,10 @@ MEMORY = 1 << 30
 def split_cores(
     settings: Iterable[Settings], workers: int | None, threads: int | None, *, on_cpu: bool
 ) -> tuple[int, int | None]:
-    """Return the number of processes, and of threads for each.
+    """Return the number of processes, and of threads for each; both may be given (not None).
 
     One process per core with one thread each does more than one process with all threads, since reading,
     scoring, writing and densification are not split among threads. On a GPU they would share the one device.
-
-    Args:
-        settings: settings of each image.
-        workers: requested number of processes; None: chosen here.
-        threads: requested number of threads; None: the cores are divided.
-        on_cpu: whether images are made on the CPU.
     """
     cores = available_cores()
     # Shapes times steps of a batch from which processes save more than the seconds that they take to start.

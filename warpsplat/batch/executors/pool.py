@@ -163,10 +163,7 @@ class _Forward(QueueHandler):
 def do_tasks(channel: Connection, level: int, workers: int) -> None:
     """Do the tasks that come through ``channel``: the main function of a worker process.
 
-    Args:
-        channel: to the parent.
-        level: level of the log records that the parent shows.
-        workers: how many processes share the machine.
+    ``level``: of the log records that the parent shows; ``workers``: how many processes share the machine.
     """
     for number in (signal.SIGINT, signal.SIGTERM):  # where they could not be blocked
         signal.signal(number, signal.SIG_IGN)

@@ -17,14 +17,9 @@ from warpsplat.errors import UsageError, printable
 
 @contextlib.contextmanager
 def connected(ray: ModuleType, address: str) -> Iterator[bool]:
-    """Connect to a cluster for a block; yield whether it was started for it.
+    """Connect to a cluster for a block; yield whether it was started for it. ``address``: see ``RayCluster``.
 
-    Args:
-        ray: the package Ray.
-        address: as ``RayCluster`` has it.
-
-    Raises:
-        UsageError: there is no such cluster, or it has other versions of Ray or Python.
+    Raises ``UsageError`` if there is no such cluster, or it has other versions of Ray or Python.
     """
     with _quiet():
         with _signal_handlers_kept():
@@ -92,10 +87,7 @@ def ray_cause(error: BaseException) -> str:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Ray from printing messages about lost workers to the standard output, where results may go.
-
-    It has no option for that.
-    """
+    """Keep Ray from printing about lost workers to stdout, where results may go; no option does that."""
     log = logging.getLogger("ray")
     with contextlib.ExitStack() as stack:
         stack.callback(log.setLevel, log.level)

@@ -27,15 +27,9 @@ if TYPE_CHECKING:
 
 
 def do(task: Task, stop: Stop, on_progress: OnProgress) -> Outcome:
-    """Do ``task``, and return any error in its outcome.
+    """Do ``task``, and return any error in its outcome; ``stop`` and ``on_progress`` are called during it.
 
-    Args:
-        task: an image to vectorize, or a result to measure.
-        stop: called after every step; once true, the current shapes make the file.
-        on_progress: called every few steps.
-
-    Raises:
-        KeyboardInterrupt: by a signal's handler, with nothing of this image to save.
+    Raises ``KeyboardInterrupt``, by a signal's handler, with nothing of this image to save.
     """
     try:
         return _made(task, stop, on_progress) if task.result is None else _measured(task, task.result)

@@ -114,8 +114,7 @@ class WorkerExecutor(Executor, Generic[AnyWorker]):
     def _lost(self, worker: AnyWorker, cause: str) -> Outcome | None:
         """Remove a dead worker; keep its task for another try, or return its failure after the last one.
 
-        Raises:
-            ResourceError: too many workers died before they responded.
+        Raises ``ResourceError`` if too many workers died before they responded.
         """
         self._remove([worker])
         self._stillborn = 0 if worker.responded else self._stillborn + 1

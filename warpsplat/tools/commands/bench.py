@@ -15,11 +15,7 @@ from warpsplat.extensions import renderer_names
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Parse ``768x512`` as (width, height) [px].
-
-    Raises:
-        UsageError: not a size, or one side is not between 16 and 16384.
-    """
+    """Parse ``768x512`` as (width, height) [px]; raise ``UsageError`` for anything else."""
     found = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.strip().lower())
     if not found or not all(16 <= int(n) <= 16384 for n in found.groups()):
         raise UsageError(f"not a size: {shown(text)}; write 768x512, each side from 16 to 16384")
