@@ -26,15 +26,7 @@ from warpsplat.rendering.parameters import Parameters
 from warpsplat.rendering.program import Program
 from warpsplat.rendering.renderer import Renderer
 from warpsplat.run import memory
-from warpsplat.run.memory import (
-    DeviceMemory,
-    check_refined,
-    factor_for,
-    memory_limit,
-    near_edges,
-    need,
-    need_on_gpu,
-)
+from warpsplat.run.memory import Demand, DeviceMemory, check_refined, memory_limit, near_edges
 from warpsplat.run.prepare import prepare
 
 HUGE = ImageFacts(12_000, 9_000, 3, 4, drafts=True)
@@ -68,13 +60,14 @@ def bare(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_need_grows_with_all_that_takes_memory() -> None:
-    base = need(HUGE, Settings())
+    huge, kept = Demand(HUGE), Demand(replace(HUGE, kept=12))
+    base = huge.need(Settings())
     assert 2 << 30 < base < 4e9
-    assert need(HUGE, Settings(), 2) < base / 1.5 < base < need(replace(HUGE, kept=12), Settings())
-    small = ImageFacts(1200, 900, 3, 4, drafts=False)
+    assert huge.need(Settings(), 2) < base / 1.5 < base < kept.need(Settings())
+    small = Demand(ImageFacts(1200, 900, 3, 4, drafts=False))
     options = ("curves", 8000), ("open", True), ("paint", "auto"), ("levels", "8,512"), ("subject", "line")
     for name, value in options:
-        assert need(small, make_settings(**{name: value})) > need(small, Settings()), name
+        assert small.need(make_settings(**{name: value})) > small.need(Settings()), name
 
 
 def test_a_drawing_takes_memory_for_its_edges(bare: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,23 +80,23 @@ def test_a_drawing_takes_memory_for_its_edges(bare: None, monkeypatch: pytest.Mo
     monkeypatch.setattr(memory, "STRIP_PIXELS", 64 * 16)
     assert near_edges(image_of(hatched)) == counts[1]
     facts = image_facts(encoded(plain))
-    limit = need(facts, make_settings(subject="drawing", quality="draft"), edges=counts[0])
-    assert limit < need(facts, make_settings(subject="drawing"), edges=counts[0])
+    limit = Demand(facts, edges=counts[0]).need(make_settings(subject="drawing", quality="draft"))
+    assert limit < Demand(facts, edges=counts[0]).need(make_settings(subject="drawing"))
     settings = make_settings(subject="drawing", quality="draft", max_memory=limit)
     assert prepare(encoded(plain), settings).reduction is None
     reduction = prepare(encoded(hatched), settings).reduction
-    assert reduction and need(facts, settings, reduction.factor, edges=counts[1]) <= limit
+    assert reduction and Demand(facts, edges=counts[1]).need(settings, reduction.factor) <= limit
 
 
 def test_the_size_is_the_largest_within_the_limit() -> None:
     for limit in ("4GB", "1GB", "600MB"):
         settings = make_settings(max_memory=limit)
-        factor = factor_for(HUGE, settings, "huge.jpg")
+        factor = Demand(HUGE).factor(settings, "huge.jpg")
         most = settings.max_memory
-        assert most and memory_limit(settings) == most and need(HUGE, settings, factor) <= most
-        assert factor == 1 or need(HUGE, settings, factor // 2) > most
+        assert most and memory_limit(settings) == most and Demand(HUGE).need(settings, factor) <= most
+        assert factor == 1 or Demand(HUGE).need(settings, factor // 2) > most
     with pytest.raises(ResourceError, match=r"^huge\.jpg: at least \d+ MB are needed, max-memory is 1 MB$"):
-        factor_for(HUGE, make_settings(max_memory="1MB"), "huge.jpg")
+        Demand(HUGE).factor(make_settings(max_memory="1MB"), "huge.jpg")
 
 
 def test_the_machine_s_memory_is_the_default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +104,7 @@ def test_the_machine_s_memory_is_the_default_limit(monkeypatch: pytest.MonkeyPat
         monkeypatch.setattr(memory, "machine_memory", lambda found=found: found)
         monkeypatch.setattr(memory.Sharing, "processes", processes)
         assert memory_limit(Settings()) == limit
-    assert factor_for(HUGE, Settings(), "huge.jpg") == 1
+    assert Demand(HUGE).factor(Settings(), "huge.jpg") == 1
 
 
 def test_the_limits_of_containers_are_seen(tmp_path: Path) -> None:
@@ -186,7 +179,7 @@ def test_a_file_of_a_smaller_run_has_the_size_of_the_image(
     data = encoded(pixels(mode))
     facts = image_facts(data)
     assert facts
-    limit = need(facts, make_settings(curves=4)) - 1
+    limit = Demand(facts).need(make_settings(curves=4)) - 1
     monkeypatch.setattr("warpsplat.run.memory.whole_score", lambda *_: limit + (not whole))
     output = tmp_path / "out.svg"
     made = warpsplat.vectorize(data, **QUICK, max_memory=limit, output=output, name="big.png")
@@ -211,8 +204,8 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image() -> None:
     facts, of_mask = image_facts(data), image_facts(mask)
     assert facts and of_mask
     settings = make_settings(curves=4)
-    whole = need(facts, settings, mask=of_mask)
-    assert whole > need(facts, settings)
+    whole = Demand(facts, mask=of_mask).need(settings)
+    assert whole > Demand(facts).need(settings)
     for limit, words in ((whole - 1, "processed at 33x25"), (whole, "")):
         made = warpsplat.vectorize(data, **QUICK, importance=mask, max_memory=limit, name="big.png")
         assert words in made.reduced and bool(words) == bool(made.reduced)
@@ -262,14 +255,14 @@ def test_nothing_of_a_run_is_left() -> None:
 
 def test_the_memory_of_a_gpu_limits_the_size_too() -> None:
     for limit in (400 << 20, 150 << 20, 60 << 20):
-        factor = factor_for(HUGE, Settings(), "huge.jpg", gpu=DeviceMemory("cuda:0", limit))
-        assert need_on_gpu(HUGE, Settings(), factor) <= limit
-        assert factor == 1 or need_on_gpu(HUGE, Settings(), factor // 2) > limit
+        factor = Demand(HUGE, gpu=DeviceMemory("cuda:0", limit)).factor(Settings(), "huge.jpg")
+        assert Demand(HUGE).need_on_gpu(Settings(), factor) <= limit
+        assert factor == 1 or Demand(HUGE).need_on_gpu(Settings(), factor // 2) > limit
     words = (
         r"^huge\.jpg: at least \d+ MB are needed, free memory of cuda:1 for it is 1 MB; .*--device cpu none"
     )
     with pytest.raises(ResourceError, match=words):
-        factor_for(HUGE, Settings(), "huge.jpg", gpu=DeviceMemory("cuda:1", 1 << 20))
+        Demand(HUGE, gpu=DeviceMemory("cuda:1", 1 << 20)).factor(Settings(), "huge.jpg")
     data = encoded(pixels())
     with pytest.raises(
         ResourceError, match=r"65x49 pixels take about .*, free memory of cuda:0 .*; refine against"

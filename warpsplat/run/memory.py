@@ -17,10 +17,10 @@ from PIL import Image
 
 from warpsplat.drawing.trace.grids import dilated, uneven_pixels
 from warpsplat.drawing.trace.seeds import EDGE
-from warpsplat.errors import ResourceError
+from warpsplat.errors import ImageError, ResourceError
 from warpsplat.files.image import ImageFacts, image_facts, load_rows
 from warpsplat.files.resolution import resolution_of
-from warpsplat.files.sources import ImageSource
+from warpsplat.files.sources import ImageSource, image_of
 from warpsplat.fit.options import limits_of
 from warpsplat.fit.problem import Fit
 from warpsplat.fit.schedule import phases
@@ -91,58 +91,6 @@ def near_edges(image: FloatArray) -> int:
     return sum(int(dilated(uneven_pixels(strip, EDGE / 255), 5).sum()) for strip in strips)
 
 
-def need(
-    facts: ImageFacts,
-    settings: Settings,
-    factor: int = 1,
-    mask: ImageFacts | None = None,
-    edges: float = 0,
-) -> int:
-    """Estimate the peak of a run [bytes] from above: for photographs within a quarter.
-
-    ``factor``: how many times smaller the image is read, in each direction; ``mask``: facts of a mask;
-    ``edges``: pixels near edges of the image itself, as far as is known, if it is a drawing.
-    """
-    pixels = facts.width * facts.height
-    worked = pixels / factor**2
-    drafted = min(factor, 8) ** 2 if facts.drafts else 1
-    reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
-    traced = TRACED.get(settings.subject)
-    working = traced * worked if traced else _fitting(facts, settings, factor)
-    if settings.subject == "drawing":
-        stages = 1 + settings.tidy
-        working += stages * DRAWN_EDGE * min(edges / factor, worked) + settings.tidy * DRAWN
-    cut_out = 64  # bytes per pixel of removing the background of a photograph
-    if settings.removal and not traced:
-        working = max(working, cut_out * worked)
-    scoring = _scoring(facts, settings, worked)
-    if mask:  # which is read beside the image, and held
-        masked = mask.width * mask.height / mask_factor(facts, mask, factor) ** 2
-        whole = (mask.decoded + mask.kept) * mask.width * mask.height
-        reading = max(reading, whole + (MASK_READ + MASK) * masked + STRIPS)
-        working, scoring = working + MASK * masked, scoring + MASK * masked
-    return round(PROGRAM + 4 * facts.channels * worked + max(reading, working, scoring))
-
-
-def need_on_gpu(facts: ImageFacts, settings: Settings, factor: int = 1) -> int:
-    """Estimate the peak of a run on a GPU [bytes] from above."""
-    traced_on_gpu = 160  # bytes per pixel of the renders of a drawing, on a GPU
-    traced = traced_on_gpu * facts.width * facts.height / factor**2
-    working = traced if settings.subject in TRACED else _fitting(facts, settings, factor, LANES)
-    return round(ON_GPU + working)
-
-
-def mask_factor(facts: ImageFacts, mask: ImageFacts, factor: int) -> int:
-    """Return how many times smaller the mask of an image that is reduced ``factor`` times is read.
-
-    It keeps the detail that the reduced image has.
-    """
-    found = factor
-    while found > 1 and mask.width // found < facts.width // factor:
-        found //= 2
-    return found
-
-
 def _fitting(facts: ImageFacts, settings: Settings, factor: int, lanes: int = 0) -> float:
     """Return the bytes of the finest phase, which is the largest; the surplus of shapes is gone by then.
 
@@ -179,8 +127,8 @@ def whole_score(facts: ImageFacts, settings: Settings, factor: int) -> int:
     return round(PROGRAM + held + _scoring(facts, settings, pixels))
 
 
-def facts_of(source: ImageSource, background: str = "auto") -> ImageFacts | None:
-    """Return the facts of an image file's bytes, a Pillow image or an array; None for what cannot be read.
+def facts_of(source: ImageSource, name: str, background: str = "auto") -> ImageFacts:
+    """Return the facts of an image file's bytes, a Pillow image or an array; errors are as of ``image_of``.
 
     ``background``: as in the settings, which decides whether the image has opacity.
     """
@@ -193,9 +141,10 @@ def facts_of(source: ImageSource, background: str = "auto") -> ImageFacts | None
     elif isinstance(source, Image.Image):
         stated = resolution_of(source)
         facts = ImageFacts(source.width, source.height, 4, 4, drafts=False, resolution=stated)
-    if facts and background != "auto":
-        facts = replace(facts, channels=4 if background == "none" else 3)
-    return facts
+    if facts is None:
+        image_of(source, name)  # which says what is wrong with it
+        raise ImageError(f"{name}: not an image")
+    return facts if background == "auto" else replace(facts, channels=4 if background == "none" else 3)
 
 
 def memory_limit(settings: Settings) -> int | None:
@@ -240,50 +189,101 @@ class Lack(NamedTuple):
     remedy: str = ""
 
 
-def _lack(
-    facts: ImageFacts,
-    settings: Settings,
-    factor: int,
-    mask: ImageFacts | None,
-    gpu: DeviceMemory | None,
-    edges: float = 0,
-) -> Lack | None:
-    """Return the memory that is short for a run; None if there is enough."""
-    limit, wanted = memory_limit(settings), need(facts, settings, factor, mask, edges)
-    if limit is not None and wanted > limit:
-        return Lack(wanted, limit_words(settings, limit))
-    if gpu and (wanted := need_on_gpu(facts, settings, factor)) > gpu.limit:
-        free = f"free memory of {gpu.name} for it is {in_words(gpu.limit)}"
-        return Lack(wanted, free, "; fewer --curves take less, --device cpu none of it")
-    return None
-
-
 def limit_words(settings: Settings, limit: int) -> str:
     """Return the limit of memory, for messages."""
     return f"{'max-memory is' if settings.max_memory else 'memory for it is'} {in_words(limit)}"
 
 
-def factor_for(
-    facts: ImageFacts | None,
-    settings: Settings,
-    name: str,
-    mask: ImageFacts | None = None,
-    least: int = 1,
-    gpu: DeviceMemory | None = None,
-    edges: float = 0,
-) -> int:
-    """Return how many times an image has to be reduced: a power of two, at least ``least``; see ``need``.
+@dataclass(frozen=True)
+class Demand:
+    """Everything besides the settings that decides how much memory a run takes."""
 
-    Raises ``ResourceError``, which begins with ``name``, if the limit is too small for any size.
-    """
-    factor = least
-    while facts and (lack := _lack(facts, settings, factor, mask, gpu, edges)):
-        factor *= 2
-        if min(facts.width, facts.height) < LEAST_REDUCED_SIDE * factor:
-            raise ResourceError(
-                f"{name}: at least {in_words(lack.wanted)} are needed, {lack.limit}{lack.remedy}"
-            )
-    return factor
+    facts: ImageFacts
+    mask: ImageFacts | None = None
+    edges: float = 0
+    """Pixels near edges of the image itself, as far as is known, if it is a drawing."""
+    gpu: DeviceMemory | None = None
+
+    def need(self, settings: Settings, factor: int = 1) -> int:
+        """Estimate the peak of a run [bytes] from above: for photographs within a quarter.
+
+        ``factor``: how many times smaller the image is read, in each direction.
+        """
+        facts, mask = self.facts, self.mask
+        pixels = facts.width * facts.height
+        worked = pixels / factor**2
+        drafted = min(factor, 8) ** 2 if facts.drafts else 1
+        reading = facts.decoded * pixels / drafted + facts.kept * pixels + STRIPS
+        traced = TRACED.get(settings.subject)
+        working = traced * worked if traced else _fitting(facts, settings, factor)
+        if settings.subject == "drawing":
+            stages = 1 + settings.tidy
+            working += stages * DRAWN_EDGE * min(self.edges / factor, worked) + settings.tidy * DRAWN
+        cut_out = 64  # bytes per pixel of removing the background of a photograph
+        if settings.removal and not traced:
+            working = max(working, cut_out * worked)
+        scoring = _scoring(facts, settings, worked)
+        if mask:  # which is read beside the image, and held
+            masked = mask.width * mask.height / self.mask_factor(factor) ** 2
+            whole = (mask.decoded + mask.kept) * mask.width * mask.height
+            reading = max(reading, whole + (MASK_READ + MASK) * masked + STRIPS)
+            working, scoring = working + MASK * masked, scoring + MASK * masked
+        return round(PROGRAM + 4 * facts.channels * worked + max(reading, working, scoring))
+
+    def need_on_gpu(self, settings: Settings, factor: int = 1) -> int:
+        """Estimate the peak of a run on a GPU [bytes] from above."""
+        facts, traced_on_gpu = self.facts, 160  # bytes per pixel of the renders of a drawing, on a GPU
+        traced = traced_on_gpu * facts.width * facts.height / factor**2
+        working = traced if settings.subject in TRACED else _fitting(facts, settings, factor, LANES)
+        return round(ON_GPU + working)
+
+    def mask_factor(self, factor: int) -> int:
+        """Return how many times smaller the mask of an image that is reduced ``factor`` times is read.
+
+        It keeps the detail that the reduced image has.
+        """
+        while self.mask and factor > 1 and self.mask.width // factor < self.facts.width // factor:
+            factor //= 2
+        return factor
+
+    def lack(self, settings: Settings, factor: int = 1) -> Lack | None:
+        """Return the memory that is short for a run; None if there is enough."""
+        limit, wanted = memory_limit(settings), self.need(settings, factor)
+        if limit is not None and wanted > limit:
+            return Lack(wanted, limit_words(settings, limit))
+        if self.gpu and (wanted := self.need_on_gpu(settings, factor)) > self.gpu.limit:
+            free = f"free memory of {self.gpu.name} for it is {in_words(self.gpu.limit)}"
+            return Lack(wanted, free, "; fewer --curves take less, --device cpu none of it")
+        return None
+
+    def factor(self, settings: Settings, name: str, least: int = 1) -> int:
+        """Return how many times an image has to be reduced: a power of two, at least ``least``.
+
+        Raises ``ResourceError``, which begins with ``name``, if the limit is too small for any size.
+        """
+        factor = least
+        while lack := self.lack(settings, factor):
+            factor *= 2
+            if min(self.facts.width, self.facts.height) < LEAST_REDUCED_SIDE * factor:
+                raise ResourceError(
+                    f"{name}: at least {in_words(lack.wanted)} are needed, {lack.limit}{lack.remedy}"
+                )
+        return factor
+
+    def reduction(
+        self, source: ImageSource, target: FloatArray, settings: Settings, factor: int
+    ) -> Reduction | None:
+        """Return the reduction of ``source`` to ``target``; None if that has the image's own size."""
+        lack = self.lack(settings) if factor > 1 else None
+        if lack is None:
+            return None
+        facts, whole, limit = self.facts, None, memory_limit(settings)
+        has_room = limit is None or whole_score(facts, settings, factor) <= limit
+        if isinstance(source, bytes) and not facts.deep and has_room:
+            paper = solid_color(settings.background)
+            whole = functools.partial(load_rows, source, paper, target.shape[2])
+        why = f"{facts.width}x{facts.height} pixels take about {in_words(lack.wanted)}, {lack.limit}"
+        return Reduction(factor, facts.width, facts.height, whole, why)
 
 
 def need_refined(facts: ImageFacts, settings: Settings) -> int:
@@ -293,19 +293,17 @@ def need_refined(facts: ImageFacts, settings: Settings) -> int:
     # Additional bytes per pixel of refining an SVG: pictures of the SVG and of the scene that was read, a
     # file that is not drawn in strips, and the image on a colour.
     refined = 40
-    return max(need(facts, settings) + refined * pixels, cleared)
+    return max(Demand(facts).need(settings) + refined * pixels, cleared)
 
 
 def check_refined(
     source: ImageSource, settings: Settings, name: str, gpu: DeviceMemory | None = None
 ) -> None:
     """Raise ``ResourceError`` if there is no memory to refine an SVG against an image at full size."""
-    facts, limit = facts_of(source), memory_limit(settings)
-    if facts is None:
-        return
+    facts, limit = facts_of(source, name), memory_limit(settings)
     wanted = need_refined(facts, settings)
     words = limit_words(settings, limit) if limit is not None and wanted > limit else ""
-    if not words and gpu and (lack := _lack(facts, settings, 1, None, gpu)):
+    if not words and gpu and (lack := Demand(facts, gpu=gpu).lack(settings)):
         wanted, words = lack.wanted, lack.limit
     if words:
         size = f"{facts.width}x{facts.height} pixels take about {in_words(wanted)}"
@@ -350,26 +348,3 @@ class Reduction:
         """Return a message about the reduction."""
         small = f"{-(-self.width // self.factor)}x{-(-self.height // self.factor)}"
         return f"{self.why}: processed at {small}, measured at {'full' if self.whole else 'that'} size"
-
-
-def reduction_for(
-    source: ImageSource,
-    facts: ImageFacts | None,
-    mask: ImageFacts | None,
-    target: FloatArray,
-    settings: Settings,
-    factor: int,
-    gpu: DeviceMemory | None = None,
-    edges: float = 0,
-) -> Reduction | None:
-    """Return the reduction of ``source`` to ``target``; None if that has the image's own size."""
-    lack = _lack(facts, settings, 1, mask, gpu, edges) if facts and factor > 1 else None
-    if facts is None or lack is None:
-        return None
-    whole, limit = None, memory_limit(settings)
-    has_room = limit is None or whole_score(facts, settings, factor) <= limit
-    if isinstance(source, bytes) and not facts.deep and has_room:
-        paper = solid_color(settings.background)
-        whole = functools.partial(load_rows, source, paper, target.shape[2])
-    why = f"{facts.width}x{facts.height} pixels take about {in_words(lack.wanted)}, {lack.limit}"
-    return Reduction(factor, facts.width, facts.height, whole, why)

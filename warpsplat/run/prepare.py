@@ -20,15 +20,7 @@ from warpsplat.fit.problem import Problem
 from warpsplat.fit.settings import SUBJECTS, Settings, Subject, make_settings, solid_color
 from warpsplat.native import release_memory
 from warpsplat.portable.filters import boxed
-from warpsplat.run.memory import (
-    DeviceMemory,
-    Reduction,
-    factor_for,
-    facts_of,
-    mask_factor,
-    near_edges,
-    reduction_for,
-)
+from warpsplat.run.memory import Demand, DeviceMemory, Reduction, facts_of, near_edges
 from warpsplat.run.result import job_key
 from warpsplat.run.strategies import choose_strategy
 from warpsplat.scene import FloatArray, Kind, Scene
@@ -85,38 +77,36 @@ def prepare(
         assert isinstance(source, bytes), "pixels have no key"
         assert importance is None or isinstance(importance, bytes)
         key = job_key(settings, source, importance)
-    facts = facts_of(source, "none" if settings.removal else settings.background)
-    mask_facts = None if importance is None else facts_of(importance)
+    facts = facts_of(source, name, "none" if settings.removal else settings.background)
+    demand = Demand(facts, None if importance is None else facts_of(importance, mask_name))
     is_silhouette = settings.subject == "silhouette"
-    first = factor_for(facts, settings, name, mask_facts, silhouette_factor(facts) if is_silhouette else 1)
+    first = demand.factor(settings, name, silhouette_factor(facts) if is_silhouette else 1)
     target = image_of(source, name, paper=solid_color(settings.background), factor=first)
     is_transparent = target.shape[2] == 4
     chosen, why, notes = choose_subject(target, settings, loss)
-    gpu = None
+    if chosen.subject == "drawing":
+        demand = replace(demand, edges=first * near_edges(target))
     if backend and choose_strategy(chosen).uses_device:
-        gpu = DeviceMemory.of(backend().device)
-    edges = first * near_edges(target) if chosen.subject == "drawing" else 0
-    factor = factor_for(facts, chosen, name, mask_facts, first, gpu, edges)
+        demand = replace(demand, gpu=DeviceMemory.of(backend().device))
+    factor = demand.factor(chosen, name, first)
     if factor > first:
         target = boxed(target, factor // first)
     release_memory()
-    reduction = reduction_for(source, facts, mask_facts, target, chosen, factor, gpu, edges)
+    reduction = demand.reduction(source, target, chosen, factor)
     if is_silhouette:
         target = silhouettes(target, name)
-        if facts and factor > 1:
+        if factor > 1:
             reduction = Reduction(factor, facts.width, facts.height, None, "outlines need no more pixels")
     elif chosen.subject == "photo" and chosen.removal and target.shape[2] == 3:
         target, notes = without_background(target, chosen, notes)
         reduction = reduction and replace(reduction, whole=None)  # which has its background
     removes_none = is_transparent and bool(chosen.remove_background)
     notes += _unexpected(target, chosen, removes_none=removes_none, is_masked=importance is not None)
-    resolution = facts.resolution if facts else None
     problem = Problem(target, chosen, loss=loss, metadata=key)
-    prepared = PreparedImage(problem, why, notes, reduction, name, resolution)
+    prepared = PreparedImage(problem, why, notes, reduction, name, facts.resolution)
     if importance is None:
         return prepared
-    mask_reduced = mask_factor(facts, mask_facts, factor) if facts and mask_facts else 1
-    mask = load_importance(importance, *prepared.size, mask_name, mask_reduced)
+    mask = load_importance(importance, *prepared.size, mask_name, demand.mask_factor(factor))
     return replace(prepared, problem=replace(prepared.problem, importance=mask))
 
 
@@ -143,10 +133,10 @@ def load_target(source: ImageSource, name: str | None, background: str) -> Float
     return image
 
 
-def silhouette_factor(facts: ImageFacts | None) -> int:
+def silhouette_factor(facts: ImageFacts) -> int:
     """Return how many times smaller an image is read for its silhouettes: a power of two."""
     factor = 1
-    while facts and facts.width * facts.height > 2 * MOST_PIXELS * factor * factor:
+    while facts.width * facts.height > 2 * MOST_PIXELS * factor * factor:
         factor *= 2
     return factor
 

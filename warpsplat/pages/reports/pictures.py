@@ -14,7 +14,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from warpsplat.files.image import WEBP_SIDE
-from warpsplat.files.sources import ImageSource, image_of
+from warpsplat.files.sources import ImageSource, held, image_of, source_name
 from warpsplat.pages.environment import webp_uri
 from warpsplat.run.memory import facts_of
 from warpsplat.run.render import to_pillow
@@ -70,10 +70,8 @@ def shown_image(source: ImageSource, name: str | None, most: int = PAGE_PIXELS) 
     Raises:
         ImageError, TypeError: as ``image_of``.
     """
-    facts = facts_of(source)
-    if facts is None:
-        pixels = image_of(source, name)
-        return ShownImage(pixels, pixels.shape[1], pixels.shape[0])
+    name, source = name or source_name(source), held(source)
+    facts = facts_of(source, name)
     width, height = facts.width, facts.height
     factor = math.ceil(max(1, math.sqrt(width * height / most), max(width, height) / WEBP_SIDE))
     return ShownImage(image_of(source, name, factor=factor), width, height)
