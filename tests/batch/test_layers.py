@@ -104,7 +104,6 @@ def test_names_of_results(folder: Path, output: str, made: str) -> None:
         ("curves=[", "is not plain YAML"),
         ("curves=", "has no value"),
         ("rates.points=x", "rates"),
-        ("open=false", "must be true"),
         ("curves=!!python/object:os.system x", "is not plain YAML"),
     ],
 )
@@ -124,8 +123,6 @@ def test_values_of_set_options() -> None:
     for flags, sets in (({"curves": 3}, ["curves=4"]), ({}, ["rates.points=1", "rates.points=2"])):
         with pytest.raises(UsageError, match="given twice"):
             command_layer(flags, sets)
-    with pytest.raises(UsageError, match="closed is there as well"):
-        command_layer({"closed": True}, ["open=true"])
 
 
 def test_inputs_of_the_command_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

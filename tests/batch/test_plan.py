@@ -30,7 +30,7 @@ def test_jobs(folder: Path) -> None:
     text = """
 defaults: {curves: 9, open: true, output: out, device: cpu}
 jobs:
-  - {images: 'in/[ab].*', closed: true}
+  - {images: 'in/[ab].*', open: false}
   - {images: [in/**/c.png, in/broken.png], curves: 5, quality: draft, output: other}
 """
     jobs = load_jobs(write(folder, text))
@@ -122,8 +122,12 @@ BAD = [
     ("jobs:\n  - images: in/a.png\n    curves:\n", 3, "curves"),
     ("defaults:\n  seed: true\njobs:\n  - images: in/a.png\n", 2, "seed"),
     ("defaults:\n  quality: [draft]\njobs:\n  - images: in/a.png\n", 2, "quality"),
-    ("jobs:\n  - images: in/a.png\n    closed: true\n    open: true\n", 4, "open"),
-    ("jobs:\n  - images: in/a.png\n    open: no\n", 3, "open"),
+    (
+        "jobs:\n  - images: in/a.png\n    closed: true\n    open: true\n",
+        2,
+        "closed and open cannot be combined",
+    ),
+    ("jobs:\n  - images: in/a.png\n    open: maybe\n", 3, "open must be true or false"),
     ("jobs:\n  - images: in/a.png\n    output: 3\n", 3, "output"),
     ("jobs:\n  - images: in/a.png\n    importance: 3\n", 3, "importance: must be text, not 3"),
     ("jobs:\n  - images: nothing/*.png\n", 2, "nothing/*.png"),

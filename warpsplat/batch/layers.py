@@ -54,7 +54,6 @@ def layer_of(file: BatchFile, entries: dict[str, tuple[int, yaml.Node]]) -> dict
             layer[key] = GivenValue(value, file.error_at(line), file.path.parent)
         elif key in KEYS:
             layer[key] = _single(file, key, line, node)
-    _check_kinds(layer)
     return layer
 
 
@@ -98,10 +97,7 @@ def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
         if inner is None:
             hint = BY_NAME[key].hint if key in BY_NAME else ""
             raise UsageError(f"{name} has no value{hint}")
-        if key in KINDS:
-            if value is not True:
-                raise UsageError(f"must be true, not {shown(value)}; leave it out or give the other kind")
-        elif key == "curves" and isinstance(value, str) and "," in value:
+        if key == "curves" and isinstance(value, str) and "," in value:
             numbers = ", ".join(word.strip() for word in value.split(","))
             raise UsageError(f"takes one number; for one job with each, {MATRIX}: {{{key}: [{numbers}]}}")
         elif key not in TEXT_KEYS:  # they are texts already
@@ -109,11 +105,6 @@ def check_value(key: str, value: Any, error_at: ErrorAt) -> None:
     except (UsageError, TypeError) as error:
         said = str(error)
         raise error_at(said if said.startswith(f"{name} ") else f"{name}: {said}") from error
-
-
-def _check_kinds(layer: Layer) -> None:
-    if "closed" in layer and "open" in layer:
-        raise layer["open"].error("open: closed is there as well; give one of them")
 
 
 def assigned(text: str) -> tuple[str, Any]:
@@ -150,7 +141,6 @@ def command_layer(flags: Mapping[str, Any], sets: Sequence[str]) -> dict[str, Gi
             raise UsageError(f"--set {cut(text)}: {key} is given twice")
         one = _given(f"--set {cut(text)}", key, value)
         layer[key] = GivenValue({**layer[key].value, **value}, one.error, one.base) if key in layer else one
-    _check_kinds(layer)
     return layer
 
 

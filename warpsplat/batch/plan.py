@@ -1,21 +1,4 @@
-"""Plan the jobs of a command line and its batch files, and check them before anything starts.
-
-::
-
-    defaults:            # of every job; keys: the long flags of `warpsplat vectorize`, and RESEARCH_KEYS
-      curves: 512
-      output: svg        # folder for the results, or their names; default: beside each image
-    presets:             # beside those of configs/presets
-      icons: {subject: drawing, minify: true}
-    jobs:
-      - images: photos/*.jpg
-        matrix: {curves: [256, 512]}
-        output: svg/{stem}-{curves}.svg
-      - images: [logo.png, icons/**/*.png]
-        preset: icons
-
-Paths are relative to the YAML file. Defaults < preset < job < command line.
-"""
+"""Plan the jobs of a command line and of batch files (docs/batch.md), and check them before any starts."""
 
 from __future__ import annotations
 
