@@ -123,7 +123,6 @@ class Loss:
     weight: Callable[[LossInputs], float]
     launch: Callable[[Program, LossInputs, float], None]
     """Records the launches for a weight."""
-    reason: str
     value: Callable[[LossInputs], float] = lambda inputs: 0.0
     """Returns its value x weight at the last render, for image losses but the squared error."""
 
@@ -216,47 +215,33 @@ def _bending_weight(inputs: LossInputs) -> float:
 
 
 IMAGE_LOSSES: tuple[Loss, ...] = (
-    Loss(
-        weight=lambda inputs: 1.0,
-        launch=_launch_image_error,
-        reason="Mean squared error (paper eq. 12, first term) and, if that was chosen, 1 - SSIM of small "
-        "windows. On a transparent canvas the mean of the errors on black and on white: an image that is "
-        "right on both is right on any background.",
-    ),
+    # Mean squared error (paper eq. 12, first term) and, if that was chosen, 1 - SSIM of small windows. On a
+    # transparent canvas the mean of the errors on black and on white: an image that is right on both is right
+    # on any background.
+    Loss(lambda inputs: 1.0, _launch_image_error),
     Loss(
         weight=lambda inputs: weight_of("ssim", inputs),
-        launch=lambda program, inputs, weight: None,
-        reason="In the kernel of the squared error.",
+        launch=lambda program, inputs, weight: None,  # in the kernel of the squared error
         value=lambda inputs: (
             weight_of("ssim", inputs) * (1 - inputs.target.mean(inputs.target.buffers.similarity))
         ),
     ),
+    # Slopes of the error: outlines that are as sharp, and run, as those of the image.
     Loss(
         weight=lambda inputs: weight_of("edges", inputs),
         launch=_launch_edges,
-        reason="Slopes of the error: outlines that are as sharp, and run, as those of the image.",
         value=lambda inputs: inputs.target.mean(inputs.target.buffers.edges),
     ),
-    Loss(
-        weight=lambda inputs: 1.0 if inputs.target.custom else 0.0,
-        launch=_launch_custom,
-        reason="A loss of the user's own (``fit.custom_loss``), which weighs itself.",
-        value=_custom_value,
-    ),
+    # A loss of the user's own (``fit.custom_loss``), which weighs itself.
+    Loss(lambda inputs: 1.0 if inputs.target.custom else 0.0, _launch_custom, _custom_value),
 )
 """The first one writes the gradient of the image, further ones add to it; the last may replace the others."""
 
 SHAPE_LOSSES: tuple[Loss, ...] = (
-    Loss(
-        weight=lambda inputs: inputs.settings.xing,
-        launch=_launch_by_contour(shape.xing_backward),
-        reason="Keeps outlines from crossing themselves (LIVE).",
-    ),
-    Loss(
-        weight=_bending_weight,
-        launch=_launch_by_contour(shape.bending_backward),
-        reason="Straightens burrs and loops too small for the image error to remove.",
-    ),
+    # Keeps outlines from crossing themselves (LIVE).
+    Loss(lambda inputs: inputs.settings.xing, _launch_by_contour(shape.xing_backward)),
+    # Straightens burrs and loops too small for the image error to remove.
+    Loss(_bending_weight, _launch_by_contour(shape.bending_backward)),
 )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from warpsplat.errors import UsageError
 from warpsplat.extensions import load_renderer
 from warpsplat.fit.settings import Settings
 from warpsplat.rendering.models import EXACT as EXACT_MODEL
@@ -61,7 +60,5 @@ EXACT = FitRenderer()
 
 def renderer_of(name: str) -> FitRenderer:
     """Return a renderer by its name; raise ``UsageError`` if there is none."""
-    found = load_renderer(name)
-    if not isinstance(found, FitRenderer):
-        raise UsageError(f"renderer {name} is not a FitRenderer")
+    found: FitRenderer = load_renderer(name)
     return found

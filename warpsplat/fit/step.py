@@ -22,7 +22,6 @@ from warpsplat.fit.state import FitState
 from warpsplat.portable import elementary, filters
 from warpsplat.rendering.backend import Viewport
 from warpsplat.rendering.forms import record_gather
-from warpsplat.rendering.models import Model
 from warpsplat.rendering.program import Program, Replay
 from warpsplat.rendering.renderer import Capacity, Renderer
 from warpsplat.rendering.tiles import read_tiles
@@ -55,11 +54,6 @@ class Target:
         """Shape (height, width), mean 1."""
         self.viewport = Viewport(*size, phase.width / width)
         self.slack = phase.slack
-
-
-def model_for(settings: Settings, step: int, slack: float = 1.0) -> Model:
-    """Return the coverage model of the settings after ``step`` steps, with a phase's ``slack``."""
-    return renderer_of(settings.renderer).model(settings, step, slack)
 
 
 class Step:
@@ -113,7 +107,7 @@ class Step:
         """Make the renderers, and record the launches."""
         state, target = self.state, self.target
         self.began = state.step if began is None else began
-        model = model_for(self.settings, self.began, target.slack)
+        model = renderer_of(self.settings.renderer).model(self.settings, self.began, target.slack)
         self.renderer = Renderer(state.parameters, target.viewport, model=model, capacity=capacity)
         levels = [state.parameters.prefix(end) for end in level_ends(state.parameters.structure)]
         self.level_renderers = [Renderer(level, target.viewport, model=model) for level in levels]

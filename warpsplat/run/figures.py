@@ -76,10 +76,10 @@ def render_figures(
     scene: Scene, target: FloatArray, settings: Settings, backend: Backend
 ) -> tuple[float, float | None]:
     """Return PSNR [dB] and SSIM of the settings' render of ``scene`` against ``target``, both in 8 bits."""
-    from warpsplat.fit.step import model_for
     from warpsplat.rendering.renderer import render
 
-    shown = np.round(255 * np.clip(render(scene, model=model_for(settings, 0), backend=backend), 0, 1))
+    model = renderer_of(settings.renderer).model(settings, step=0, slack=1.0)
+    shown = np.round(255 * np.clip(render(scene, model=model, backend=backend), 0, 1))
     wanted = np.round(255 * target)
     return psnr(shown, wanted), similarities(shown, wanted)[0]
 
