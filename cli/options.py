@@ -71,6 +71,13 @@ preset_option = option_in(
     " it count more.",
 )
 
+
+def output_option(default: str) -> Callable[[Any], Any]:
+    """Return ``-o`` of a command that writes one file; ``default``: its name, for the help."""
+    formats = "File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout."
+    return option_in("Files", "-o", "--output", type=OUTPUT, common=True, help=f"{formats}{default}")
+
+
 overwrite_option = option_in(
     "Files",
     "--overwrite",

@@ -12,10 +12,10 @@ from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
-    OUTPUT,
     Request,
     checkpoint_options,
     json_option,
+    output_option,
     overwrite_option,
     quality_options,
     run_options,
@@ -30,15 +30,7 @@ from warpsplat.fit.settings import make_settings
 @click.command("refine", cls=HookedCommand)
 @click.argument("svg", type=INPUT)
 @click.argument("image", type=INPUT)
-@option_in(
-    "Files",
-    "-o",
-    "--output",
-    type=OUTPUT,
-    common=True,
-    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout.  "
-    "[default: SVG-refined.svg, here]",
-)
+@output_option("  [default: SVG-refined.svg, here]")
 @overwrite_option
 @option_in(
     "Fitting",
@@ -92,7 +84,7 @@ def command(
         raise UsageError(f"{image}: is an SVG; refine takes the SVG first, then the image")
     output = request.output_for(svg, "-refined.svg")
     hooks.check_files([svg, image], output, checkpoint, overwrite=request.overwrite)
-    from warpsplat.cli.run import decibels, echo_exceptions, echo_unused_dxf, finish, watched
+    from warpsplat.cli.run import decibels, echo_remarks, echo_unused_dxf, finish, watched
     from warpsplat.run.command_line import refine_command
     from warpsplat.run.refine import refine
     from warpsplat.run.result import finite
@@ -120,7 +112,7 @@ def command(
         hooks.show(result, None if image == STANDARD else shown)
     before = math.inf if result.before is None else result.before
     if not request.quiet:
-        echo_exceptions(input_name(svg), result)
+        echo_remarks(input_name(svg), result)
         echo_unused_dxf(given.get("dxf"), output)
     values = {"svg": str(svg), "output": str(output), "psnr_before": finite(before), **result.as_dict()}
     if keep:

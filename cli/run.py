@@ -120,7 +120,7 @@ def echo_notes(source: Path, settings: Settings, result: Result, *, verbose: int
     if not traced and settings.simplify and not has_goal and count < settings.curves:
         hint = f"a simple image: {counted(count, 'shape')}; --curves N for another number"
         echo(f"warpsplat: {name}: {hint}", err=True)
-    echo_exceptions(name, result)
+    echo_remarks(name, result)
 
 
 def echo_unused_dxf(dxf: str | None, output: Path) -> None:
@@ -129,7 +129,7 @@ def echo_unused_dxf(dxf: str | None, output: Path) -> None:
         echo(f"warpsplat: {output}: --dxf {dxf} has no effect; give -o FILE.dxf", err=True)
 
 
-def echo_exceptions(name: str, result: Result) -> None:
+def echo_remarks(name: str, result: Result) -> None:
     """Print the notes of a run, what was kept, how the image was reduced, and whether shapes were reset."""
     reset = f"shapes with numbers that are not finite were reset, {counted(result.renewed, 'time')}"
     notes = (

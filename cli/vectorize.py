@@ -12,11 +12,11 @@ from warpsplat.cli.help import option_in
 from warpsplat.cli.hooks import Done, HookedCommand, Hooks, hook_options
 from warpsplat.cli.options import (
     INPUT,
-    OUTPUT,
     Request,
     checkpoint_options,
     importance_option,
     json_option,
+    output_option,
     overwrite_option,
     preset_option,
     quality_options,
@@ -30,15 +30,7 @@ from warpsplat.run.options import settings_from, with_preset
 
 @click.command("vectorize", cls=HookedCommand)
 @click.argument("images", type=INPUT, nargs=-1, required=True, metavar="IMAGE...")
-@option_in(
-    "Files",
-    "-o",
-    "--output",
-    type=OUTPUT,
-    common=True,
-    help="File to write: .svg, .svgz, .png, .pdf, .dxf or .eps; - is stdout. For several results a folder, or"
-    " OUT-{curves}.svg.  [default: IMAGE with .svg, here]",
-)
+@output_option(" For several results a folder, or OUT-{curves}.svg.  [default: IMAGE with .svg, here]")
 @overwrite_option
 @preset_option
 @quality_options(several=True)

@@ -102,7 +102,7 @@ def test_the_size_is_the_largest_within_the_limit() -> None:
 def test_the_machine_s_memory_is_the_default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     for found, processes, limit in ((10**9, 1, 9 * 10**8), (10**9, 3, 3 * 10**8), (None, 1, None)):
         monkeypatch.setattr(memory, "machine_memory", lambda found=found: found)
-        monkeypatch.setattr(memory.Sharing, "processes", processes)
+        monkeypatch.setattr(memory, "processes", processes)
         assert memory_limit(Settings()) == limit
     assert Demand(HUGE).factor(Settings(), "huge.jpg") == 1
 

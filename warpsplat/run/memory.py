@@ -83,6 +83,9 @@ image with opacity."""
 LEAST_REDUCED_SIDE = 32
 """Least side of a reduced image [px]."""
 
+processes = 1
+"""Number of processes that share this machine's memory; workers of batches set it."""
+
 
 def near_edges(image: FloatArray) -> int:
     """Return the number of pixels of an image, sRGB in [0, 1], near steps of colour that are edges."""
@@ -152,13 +155,7 @@ def memory_limit(settings: Settings) -> int | None:
     if settings.max_memory:
         return settings.max_memory
     found = machine_memory()
-    return None if found is None else round(SHARE * found / Sharing.processes)
-
-
-class Sharing:
-    """Number of processes that vectorize images on this machine at the same time."""
-
-    processes = 1
+    return None if found is None else round(SHARE * found / processes)
 
 
 @dataclass(frozen=True)
@@ -176,7 +173,7 @@ class DeviceMemory:
         import warp as wp
 
         wp.synchronize_device(device)  # or what earlier runs freed would not count
-        return DeviceMemory(str(device), round(SHARE * device.free_memory / Sharing.processes))
+        return DeviceMemory(str(device), round(SHARE * device.free_memory / processes))
 
 
 class Lack(NamedTuple):

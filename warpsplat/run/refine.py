@@ -77,8 +77,7 @@ def refine(
         name: of the SVG, in messages.
 
     Returns:
-        the result; ``before`` is the PSNR of the SVG itself, which is returned unchanged if nothing better
-        was found.
+        the result, or the SVG unchanged if nothing better was found; ``before`` is the SVG's own PSNR.
 
     Raises:
         UsageError, ImageError, CheckpointError, OutputError, ResourceError, TypeError: as for

@@ -187,9 +187,9 @@ def _end_with_parent() -> None:
 
 def _do_task(channel: Connection, task: Task, workers: int) -> None:
     from warpsplat.batch.executors.work import do
-    from warpsplat.run.memory import Sharing
+    from warpsplat.run import memory
 
-    Sharing.processes = workers
+    memory.processes = workers
     stopped, sent = False, -PAUSE
 
     def on_progress(number: int, fraction: float) -> None:
