@@ -37,7 +37,7 @@ class Done:
 
     request: Request
     data: bytes | Path
-    """The image: its bytes, or its path if no hook needs the bytes."""
+    """The image: its bytes, or the path that it can be read from again."""
     made: Sequence[tuple[Path, Result | bytes | Path]]
     """Files with their results; of ``eval``, the SVG that was measured."""
     command: str = ""
@@ -69,10 +69,6 @@ class RunHook:
 
     def check(self, inputs: Sequence[Path], outputs: Sequence[Path], *, overwrite: bool) -> None:
         """Raise ``UsageError`` before the run if what is asked for cannot be done."""
-
-    def needs_image(self) -> bool:
-        """Return whether ``Done.data`` has to be the image's bytes."""
-        return False
 
     def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
         """Return the callback of the run, in place of ``on_progress``, which shows the progress bar."""
@@ -147,10 +143,6 @@ class Hooks:
         if checkpoint:
             check_output(checkpoint, *inputs)
         self.check(inputs, [output, *filter(None, [checkpoint])], overwrite=overwrite)
-
-    def need_image(self) -> bool:
-        """Return whether a hook needs the image's bytes."""
-        return any(hook.needs_image() for hook in self._hooks)
 
     def watch(self, on_progress: Callable[[Progress], None]) -> Callable[[Progress], None]:
         """See ``RunHook``."""

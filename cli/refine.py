@@ -91,7 +91,8 @@ def command(
     from warpsplat.svg.inspect import MAX_BYTES
 
     data = read_input(svg, "an SVG", limit=MAX_BYTES)
-    shown = read_input(image) if hooks.need_image() or is_remote(image) else image
+    # The standard input can be read once, and a URL should be.
+    shown = read_input(image) if image == STANDARD or is_remote(image) else image
     with watched(request, svg) as (report, stop):
         result = refine(
             data,

@@ -50,10 +50,6 @@ class ReportHook(RunHook):
             raise UsageError(f"{self._page}: is the result; give the report another name")
         check_output(self._page, *inputs, endings=(".html", ".htm"), overwrite=overwrite)
 
-    def needs_image(self) -> bool:
-        """See ``RunHook``."""
-        return self._page is not None
-
     def finish(self, done: Done) -> None:
         """Write the page."""
         if self._page is None or not done.made:
