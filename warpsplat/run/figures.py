@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,41 +37,46 @@ def has_time_for_ssimulacra2(settings: Settings, target: FloatArray) -> bool:
     return pixels <= QUICK_PIXELS and settings.time_budget is None and has_memory
 
 
-def scored(
-    svg: str,
-    target: FloatArray,
-    settings: Settings,
-    run: Run,
-    reduction: Reduction | None,
-    *,
-    interrupted: bool,
-) -> Score | None:
-    """Return the score of a file; None for a large image whose run was stopped."""
-    quick, stopped = target[..., 0].size <= QUICK_PIXELS, interrupted or run.stopped()
-    perceptual = has_time_for_ssimulacra2(settings, target) and not stopped
-    if stopped and not quick:
-        return None
-    try:
-        if reduction:
-            return reduction.score(svg, target, run.stopped)
-        return score_svg(svg, target, own=True, perceptual=perceptual, stop=None if quick else run.stopped)
-    except Stopped:
-        return None
+@dataclass(frozen=True)
+class Reference:
+    """The image of a run, which its files and renders are compared with."""
 
+    target: FloatArray
+    settings: Settings
+    run: Run
+    reduction: Reduction | None
 
-def level_scores(
-    scene: Scene, settings: Settings, per_pixel: float, target: FloatArray, reduction: Reduction | None
-) -> tuple[LevelScore, ...]:
-    """Return the scores of the files that the first layers of a layered scene make."""
-    found = []
-    for end in (*level_ends(scene), len(scene)) if settings.levels else ():
-        text = export(scene.take(np.arange(end)), settings, per_pixel)
-        if reduction:
-            score = reduction.score(text, target, None)
-        else:
-            score = score_svg(text, target, own=True, perceptual=False)
-        found.append(LevelScore(end, score.as_dict()["psnr"]))
-    return tuple(found)
+    def _score(self, text: str, *, perceptual: bool = False, stop: Callable[[], bool] | None = None) -> Score:
+        if self.reduction:
+            return self.reduction.score(text, self.target, stop)
+        return score_svg(text, self.target, own=True, perceptual=perceptual, stop=stop)
+
+    def score(self, text: str, *, interrupted: bool) -> Score | None:
+        """Return the score of a file; None for a large image whose run was stopped."""
+        quick, stopped = self.target[..., 0].size <= QUICK_PIXELS, interrupted or self.run.stopped()
+        if stopped and not quick:
+            return None
+        perceptual = has_time_for_ssimulacra2(self.settings, self.target) and not stopped
+        may_stop = self.reduction or not quick  # a score that is quick is finished
+        try:
+            return self._score(text, perceptual=perceptual, stop=self.run.stopped if may_stop else None)
+        except Stopped:
+            return None
+
+    def level_scores(self, scene: Scene, per_pixel: float) -> tuple[LevelScore, ...]:
+        """Return the scores of the files that the first layers of a layered scene make."""
+        ends = (*level_ends(scene), len(scene)) if self.settings.levels else ()
+        texts = [export(scene.take(np.arange(end)), self.settings, per_pixel) for end in ends]
+        scores = [self._score(text).as_dict()["psnr"] for text in texts]
+        return tuple(map(LevelScore, ends, scores))
+
+    def render_score(self, made: Fit) -> tuple[float, float | None]:
+        """Return PSNR [dB] and SSIM of the render; of soft Gaussians, if small, of the finished scene."""
+        settings, run = self.settings, self.run
+        small = not self.reduction and self.target[..., 0].size <= settings.fine_pixels
+        if renderer_of(settings.renderer).soft and small and not run.failures:
+            return render_figures(made.scene, self.target, settings, run.backend)
+        return made.render_psnr, None
 
 
 def render_figures(
@@ -82,16 +89,6 @@ def render_figures(
     shown = np.round(255 * np.clip(render(scene, model=model, backend=backend), 0, 1))
     wanted = np.round(255 * target)
     return psnr(shown, wanted), similarities(shown, wanted)[0]
-
-
-def render_score(
-    made: Fit, target: FloatArray, settings: Settings, run: Run, reduction: Reduction | None
-) -> tuple[float, float | None]:
-    """Return PSNR [dB] and SSIM of the render; for soft Gaussians of the finished scene, if it is small."""
-    small = not reduction and target[..., 0].size <= settings.fine_pixels
-    if renderer_of(settings.renderer).soft and small and not run.failures:
-        return render_figures(made.scene, target, settings, run.backend)
-    return made.render_psnr, None
 
 
 def missed_goals(

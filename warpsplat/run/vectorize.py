@@ -21,7 +21,7 @@ from warpsplat.rendering.compiler import compile_seconds
 from warpsplat.run.arguments import backend_on, custom_loss, settings_given, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.explained import Explained, explained
-from warpsplat.run.figures import level_scores, missed_goals, render_score, scored
+from warpsplat.run.figures import Reference, missed_goals
 from warpsplat.run.formats import write_named
 from warpsplat.run.physical_size import (
     bridge_notes,
@@ -134,8 +134,7 @@ def make_result(
     run = timed(recorded(run, history), image.problem.settings, image.problem.target)
     with naming(image.name):
         image, strategy, made = _fitted(image, run, start)
-        problem, reduction = image.problem, image.reduction
-        target, settings = problem.target, problem.settings
+        problem, reduction, settings = image.problem, image.reduction, image.problem.settings
         report_end(made, run, history)
         optics = explained(made, problem) if made.optics and not made.interrupted else None
         made = _arranged(made, problem, strategy, run)
@@ -146,9 +145,10 @@ def make_result(
         drawn = _drawn(made, image, strategy, settings, optics)
         if write:
             write(drawn.file)
-        score = scored(drawn.judged, target, settings, run, reduction, interrupted=made.interrupted)
+        reference = Reference(problem.target, settings, run, reduction)
+        score = reference.score(drawn.judged, interrupted=made.interrupted)
         score = score.of_file(drawn.file) if score else None
-        render_psnr, render_ssim = render_score(made, target, settings, run, reduction)
+        render_psnr, render_ssim = reference.render_score(made)
         seconds = time.monotonic() - begun
         result = Result(
             svg=drawn.file,
@@ -164,7 +164,7 @@ def make_result(
             renderer=settings.renderer,
             render_ssim=render_ssim,
             missed=missed_goals(settings, score, seconds, compile_seconds() - compiled),
-            levels=level_scores(drawn.scene, settings, made.per_pixel, target, reduction) if score else (),
+            levels=reference.level_scores(drawn.scene, made.per_pixel) if score else (),
             reduced=reduction.words() if reduction else "",
             subject=settings.subject,
             why=image.why,
