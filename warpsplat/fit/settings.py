@@ -491,9 +491,15 @@ class Settings:
     def __post_init__(self) -> None:
         """Check types, ranges and contradictions, see ``check_fields``."""
         check_fields(self)
-        for is_broken, message in RULES:
+        for is_broken, *options in RULES:
             if is_broken(self):
-                raise UsageError(message.format(self))
+                raise UsageError(" and ".join(options).format(self) + " cannot be combined")
+        if len(self.palette) > MOST_COLOR_COUNT:
+            raise UsageError(f"palette has more than {MOST_COLOR_COUNT} colours")
+        if self.levels and (self.levels[0] < 1 or list(self.levels) != sorted(set(self.levels))):
+            raise UsageError(f"levels must be ascending numbers of shapes, not {self.levels}")
+        if self.levels and self.levels[-1] != self.curves:
+            raise UsageError(f"curves {self.curves} and the last of the levels {self.levels} differ")
         for given in self.unsuited(self.subject):
             if given.option.elsewhere != "ignored":
                 raise UsageError(
@@ -589,37 +595,19 @@ class Settings:
         return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:16]
 
 
-RULES: tuple[tuple[Callable[[Settings], object], str], ...] = (
-    (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed and open cannot be combined"),
-    (lambda s: s.mixed and s.shape != CURVE, "mixed and shape {0.shape} cannot be combined"),
-    (
-        lambda s: s.shape not in (CURVE, LINE) and s.kind == Kind.STROKE,
-        "shape {0.shape} and open cannot be combined",
-    ),
-    (lambda s: s.shape == LINE and s.kind == Kind.FILL, "shape line and closed cannot be combined"),
-    (
-        lambda s: s.shape != CURVE and s.renderer != "exact",
-        "shape {0.shape} and renderer {0.renderer} cannot be combined",
-    ),
-    (
-        lambda s: s.painting != "flat" and s.is_limited,
-        "paint {0.paint} and {0.limited_by} cannot be combined",
-    ),
-    (lambda s: len(s.palette) > MOST_COLOR_COUNT, f"palette has more than {MOST_COLOR_COUNT} colours"),
-    (
-        lambda s: s.levels and (s.levels[0] < 1 or list(s.levels) != sorted(set(s.levels))),
-        "levels must be ascending numbers of shapes, not {0.levels}",
-    ),
-    (
-        lambda s: s.levels and s.levels[-1] != s.curves,
-        "curves {0.curves} and the last of the levels {0.levels} differ",
-    ),
-    (lambda s: s.levels and s.counting[1:], "levels and {0.counting[1]} cannot be combined"),
-    (lambda s: s.size and s.page, "size and page cannot be combined"),
-    (lambda s: s.dpi and (s.size or s.page), "dpi and {0.sized_by} cannot be combined"),
-    (lambda s: s.dpi and s.units == "px", "dpi and units px cannot be combined"),
+RULES: tuple[tuple[Callable[[Settings], object], str, str], ...] = (
+    (lambda s: s.mixed and s.kind == Kind.STROKE, "mixed", "open"),
+    (lambda s: s.mixed and s.shape != CURVE, "mixed", "shape {0.shape}"),
+    (lambda s: s.shape not in (CURVE, LINE) and s.kind == Kind.STROKE, "shape {0.shape}", "open"),
+    (lambda s: s.shape == LINE and s.kind == Kind.FILL, "shape line", "closed"),
+    (lambda s: s.shape != CURVE and s.renderer != "exact", "shape {0.shape}", "renderer {0.renderer}"),
+    (lambda s: s.painting != "flat" and s.is_limited, "paint {0.paint}", "{0.limited_by}"),
+    (lambda s: s.levels and s.counting[1:], "levels", "{0.counting[1]}"),
+    (lambda s: s.size and s.page, "size", "page"),
+    (lambda s: s.dpi and (s.size or s.page), "dpi", "{0.sized_by}"),
+    (lambda s: s.dpi and s.units == "px", "dpi", "units px"),
 )
-"""Contradictions: whether settings have one, and its message, in which ``{0}`` stands for them. Those with a
+"""Contradictions: whether settings, ``{0}``, have one, and two options that cannot be combined. Those with a
 subject follow from ``Option.subjects``, those with a renderer from ``FitRenderer.check``."""
 
 
