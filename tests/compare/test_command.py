@@ -31,6 +31,7 @@ def test_a_comparison_and_its_files(
     folder = tmp_path / "new" / "folder"
     results = cli("compare", image, *QUICK, "-o", folder, "--json").values["results"]
     names = [f"{r['program'].lower()}-{r['setting']}" for r in results]
+    assert results[0]["seconds"] > 0 and results[0]["cpu_seconds"] > 0
     assert names == ["warpsplat-4", "warpsplat-8", "bands-one", "bands-four"]
     files = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert set(files) == REPORTS | {f"photo.{name}.svg" for name in names}
@@ -67,7 +68,11 @@ def test_several_images_and_one_failure(
     Image.new("RGB", (30, 20), "teal").save(other)
     text = cli("compare", image, other, *QUICK, "-o", tmp_path / "out").out
     assert text.count("Bands, four: failed: ValueError: no more than three") == 2
-    assert "## Mean of 2 images" in text
+    assert [line for line in text.splitlines() if line[:2] == "##"] == [
+        *("## photo.png", "## other.png", "## Mean of 2 images", "## Settings")
+    ]
+    assert "the number of fills; 12 steps, seed 0" in text
+    assert "Bands 1.2" in text and "  * four: bands 4" in text.splitlines()
     assert not list((tmp_path / "out").glob("*four*"))
 
 

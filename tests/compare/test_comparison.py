@@ -17,11 +17,11 @@ from tests.compare.tracers import SIZES, bands, stub
 from tests.fit.pictures import picture
 from tests.runs import vectorize
 from warpsplat.compare.comparison import OURS, Comparison, ComparisonRow, compare
-from warpsplat.compare.tables import markdown, means
+from warpsplat.compare.tables import means
 from warpsplat.compare.tracer import VTRACER_SETTINGS, TracerOptions, vtracer
 from warpsplat.files.sources import image_of
 from warpsplat.fit.settings import Settings, make_settings
-from warpsplat.metrics import Score, score_svg
+from warpsplat.metrics import Score
 from warpsplat.rendering.backend import Backend
 from warpsplat.run.result import Result
 from warpsplat.scene import FloatArray
@@ -29,22 +29,6 @@ from warpsplat.scene import FloatArray
 
 def run(target: FloatArray, settings: Settings, write: Callable[[str], None]) -> Result:
     return vectorize(target, settings, Backend.on("cpu"), write=write)
-
-
-def ours(*curves: int) -> list[Settings]:
-    return [make_settings(curves=n, iterations=12) for n in curves]
-
-
-def test_rows_of_both_programs_are_measured_alike() -> None:
-    target = picture()
-    rows = list(compare("a.png", target, ours(4, 8), stub(), run))
-    settings = [(OURS, "4"), (OURS, "8"), ("Bands", "one"), ("Bands", "four")]
-    assert [(row.program, row.setting) for row in rows] == settings
-    for row in rows:
-        assert row.image == "a.png" and row.score == score_svg(row.svg, target)
-        assert row.seconds > 0 and row.cpu_seconds > 0
-        assert row.as_dict().items() >= row.score.as_dict().items()
-    assert [row.score.paths for row in rows if row.score] == [4, 8, 1, 4]
 
 
 def test_the_tracer_sees_the_image_on_white(tmp_path: Path) -> None:
@@ -144,18 +128,6 @@ def test_means_are_of_settings_that_all_images_have() -> None:
     assert (program, setting) == (OURS, "8")
     assert [values[k] for k in ("psnr", "bytes", "seconds", "cpu_seconds")] == [29.125, 1734, 2.5, 4.25]
     assert values["ssim"] is None
-
-
-def test_the_tables_of_all_images() -> None:
-    one = comparison(row("a.png"), row("a.png", "Bands", "one", score=None))
-    text = markdown(one)
-    assert [line for line in text.splitlines() if line[:2] == "##"] == ["## a.png", "## Settings"]
-    assert "Bands, one: failed: ValueError: no" in text.splitlines()
-    assert "the number of fills; 12 steps, seed 3" in text
-    assert "Bands 1.2" in text
-    assert "  * four: bands 4" in text.splitlines()
-    two = comparison(*one.rows, row("b.png"))
-    assert "## Mean of 2 images" in markdown(two)
 
 
 def test_infinity_is_null_in_json() -> None:
