@@ -69,9 +69,9 @@ class RayCluster(WorkerExecutor[RayWorker]):
         self._asked = self._begun = 0.0
         """Times of the last questions to workers, and of the first search for one [s]; 0: not yet."""
 
-    def close(self) -> None:
+    def __exit__(self, *error: object) -> None:
         """See ``Executor``. A cluster that was there before stays."""
-        super().close()
+        super().__exit__(*error)
         self._connection.close()
 
     def _give(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -67,7 +68,7 @@ class Outcome:
     """Why the page could not be made, in one line."""
 
 
-class Executor:
+class Executor(AbstractContextManager["Executor"]):
     """Base of executors: does tasks, but writes no files; a lost worker that still runs can replace none.
 
     At the end of its ``with`` block, all its workers have ended.
@@ -76,16 +77,8 @@ class Executor:
     workers: int = 1
     """How many tasks it does at the same time; for messages."""
 
-    def __enter__(self) -> Executor:
-        """Begin; nothing is started before there is a task."""
-        return self
-
     def __exit__(self, *error: object) -> None:
-        """End all workers at once; return when none is left."""
-        self.close()
-
-    def close(self) -> None:
-        """End all workers; by default there are none."""
+        """End all workers at once; return when none is left. By default there are none."""
 
     def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:
         """Do ``tasks``, and yield an outcome for each that was taken, in any order, as it ends.

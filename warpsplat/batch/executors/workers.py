@@ -55,8 +55,7 @@ class WorkerExecutor(Executor, Generic[AnyWorker]):
         """Tasks that were not taken yet; None: all were."""
         self._again: list[Task] = []
 
-    def close(self) -> None:
-        """See ``Executor``."""
+    def __exit__(self, *error: object) -> None:
         self._remove(self._workers)
 
     def run(self, tasks: Iterable[Task], stop: Stop, on_progress: OnProgress) -> Iterator[Outcome]:
