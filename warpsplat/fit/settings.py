@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -184,14 +184,6 @@ class Density:
     def __post_init__(self) -> None:
         """Check ranges, see ``check_fields``."""
         check_fields(self, "density ")
-
-
-class Given(NamedTuple):
-    """An option that was given."""
-
-    name: str
-    """As users name it, with its value where that is a word."""
-    option: Option
 
 
 @described
@@ -500,11 +492,11 @@ class Settings:
             raise UsageError(f"levels must be ascending numbers of shapes, not {self.levels}")
         if self.levels and self.levels[-1] != self.curves:
             raise UsageError(f"curves {self.curves} and the last of the levels {self.levels} differ")
-        for given in self.unsuited(self.subject):
-            if given.option.elsewhere != "ignored":
+        for name, each in self.unsuited(self.subject):
+            if each.elsewhere != "ignored":
                 raise UsageError(
-                    f"subject {self.subject} and {given.name} cannot be combined; "
-                    f"{given.name} needs subject {' or '.join(given.option.subjects)}"
+                    f"subject {self.subject} and {name} cannot be combined; "
+                    f"{name} needs subject {' or '.join(each.subjects)}"
                 )
 
     @property
@@ -561,8 +553,8 @@ class Settings:
         )
         return next((quality for quality in matching if PRESETS[quality]), DEFAULT_QUALITY)
 
-    def unsuited(self, subject: Subject) -> list[Given]:
-        """Return the options given that have no effect on a subject."""
+    def unsuited(self, subject: Subject) -> list[tuple[str, Option]]:
+        """Return the options given that have no effect on a subject, each with what its user calls it."""
         if subject == "auto":
             return []
         subject = "drawing" if subject == "silhouette" else subject  # as which it is drawn
@@ -572,12 +564,12 @@ class Settings:
             by_quality = value in [preset[each.field] for preset in PRESETS.values() if each.field in preset]
             is_given = value != each.default and not by_quality
             if each.subjects and subject not in each.subjects and is_given:
-                found.append(Given(self._called(each), each))
+                found.append((self._called(each), each))
         if self.is_limited or self.stack == "cutout":  # implies it
-            found = [given for given in found if given.option.field != "opaque"]
+            found = [(name, each) for name, each in found if each.field != "opaque"]
         changed = [each for each in options_of(Settings) if each.field in OF_PRESETS & {*PRESETS[quality]}]
         if changed and not any(subject in each.subjects for each in changed):
-            found.append(Given(f"quality {quality}", changed[0]))
+            found.append((f"quality {quality}", changed[0]))
         return found
 
     def _called(self, option: Option) -> str:

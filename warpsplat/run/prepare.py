@@ -211,10 +211,8 @@ def choose_subject(
         raise UsageError(f"subject {subject} and {OWN_LOSS} cannot be combined")
     without = settings.unsuited(subject)
     if without:
-        notes.append(no_effect([given.name for given in without], subject))
-    usual = {
-        given.option.field: given.option.default for given in without if given.option.elsewhere == "refused"
-    }
+        notes.append(no_effect([name for name, _ in without], subject))
+    usual = {option.field: option.default for _, option in without if option.elsewhere == "refused"}
     return replace(settings, subject=subject, **usual), why, tuple(notes)
 
 
