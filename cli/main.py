@@ -188,14 +188,6 @@ RANGE = re.compile(r"is not in the range (?:(\S+?)<=?x<=?(\S+)|x>=(\S+))")
 """Ranges in the words of click."""
 
 
-def hint_for(flag: str) -> str:
-    """Return what messages add about an option without its value."""
-    from warpsplat.run.options import BY_NAME
-
-    option = BY_NAME.get(flag.lstrip("-"))
-    return option.hint if option else ""
-
-
 QUOTED = re.compile(r"""(["'])([^"']*)\1""")
 """Values in click's messages."""
 
@@ -219,7 +211,10 @@ def message_of(error: BaseException) -> tuple[str, int]:
             known = [each.opts[-1] for each in context.command.get_params(context)]
             message = f"no such option: {error.option_name}{nearest(error.option_name, known, '--')}"
         if isinstance(error, click.BadOptionUsage):
-            message += hint_for(error.option_name)
+            from warpsplat.run.options import BY_NAME
+
+            option = BY_NAME.get(error.option_name.lstrip("-"))
+            message += option.hint if option else ""
         if isinstance(error, click.BadParameter):
             message = RANGE.sub(
                 lambda found: (

@@ -253,11 +253,6 @@ def image_program(inputs: LossInputs) -> Program:
     return program
 
 
-def further_losses(inputs: LossInputs) -> list[Loss]:
-    """Return the image losses that join or replace the squared error."""
-    return [loss for loss in IMAGE_LOSSES[1:] if loss.weight(inputs) > 0]
-
-
 def level_programs(inputs: LossInputs, whole: Parameters) -> tuple[Program, ...]:
     """Return programs that render a level, compare, back-propagate and add the gradients to the scene's.
 

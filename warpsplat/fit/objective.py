@@ -15,7 +15,7 @@ import warp as wp
 
 from warpsplat.alpha import squares
 from warpsplat.fit.export import shown_image
-from warpsplat.fit.losses import LossInputs, LossTarget, further_losses, image_program
+from warpsplat.fit.losses import IMAGE_LOSSES, LossInputs, LossTarget, image_program
 from warpsplat.fit.problem import Problem
 from warpsplat.rendering.backend import Backend, Viewport
 from warpsplat.rendering.parameters import Parameters
@@ -61,7 +61,8 @@ class Objective:
         """``program`` evaluates the losses of images with these ``inputs``."""
         self._inputs, self._program = inputs, program
         self._renderer, self._target = inputs.renderer, inputs.target
-        self._further = further_losses(inputs)
+        self._further = [loss for loss in IMAGE_LOSSES[1:] if loss.weight(inputs) > 0]
+        """Image losses that join or replace the squared error."""
 
     def square_error(self, weights: FloatArray | None = None) -> float:
         """Return the mean squared error, with ``weights`` by tiles."""
@@ -96,7 +97,8 @@ class Objective:
         self._program.run()
         evaluation = target.evaluation
         if evaluation is not None and evaluation.by_pixel is not None:
-            return np.asarray(target.squared_error / 3 * weighted + _from_zero(evaluation.by_pixel))
+            values = evaluation.by_pixel - min(float(evaluation.by_pixel.min()), 0.0)  # none is negative
+            return np.asarray(target.squared_error / 3 * weighted + values)
         tiles = squares(self._errors(1.0), axis=1) * self._weights()
         return from_tiles(tiles[:, None], viewport.width, viewport.height)[..., 0]
 
@@ -159,8 +161,3 @@ def loss_of_file(text: str, scene: Scene, problem: Problem, backend: Backend) ->
     inputs = LossInputs(renderer, target, problem.settings, backend.array(wp.int32, 1))
     objective = Objective(inputs, image_program(inputs))
     return objective.value_of(shown_image(text, scene, problem.target.shape[2]))
-
-
-def _from_zero(values: FloatArray) -> FloatArray:
-    """Return values shifted so that none is negative."""
-    return np.asarray(values - min(float(values.min()), 0.0))

@@ -12,7 +12,6 @@ from warpsplat.metrics import psnr_of_file
 from warpsplat.portable.filters import resize_area, resize_linear
 from warpsplat.run.explained import explained, psnr_of
 from warpsplat.run.prepare import PreparedImage, choose_subject, without_background
-from warpsplat.scene import FloatArray
 
 NEXT: dict[Subject, Subject] = {"pixel": "drawing", "drawing": "photo"}
 """Subject that is tried next, by the one whose file shows too little."""
@@ -36,7 +35,8 @@ def other_subject(made: Fit, problem: Problem) -> Subject | None:
         return None
     # How much farther from the image than that a file must be, for its subject to be the wrong one [dB].
     much = 3.0
-    enough = _thumbnail_psnr(target, (max(1, int(scale * width)), max(1, int(scale * height)))) - much
+    thumbnail = resize_area(target, (max(1, int(scale * width)), max(1, int(scale * height))))
+    enough = psnr_of(resize_linear(thumbnail, (width, height)), target) - much
     if psnr_of_file(text, target) >= enough:
         return None
     # A drawing is sharp where the image may not be.
@@ -53,8 +53,3 @@ def retaken(image: PreparedImage, subject: Subject) -> PreparedImage:
         target, notes = without_background(target, settings, notes)
         image = replace(image, reduction=image.reduction and replace(image.reduction, whole=None))
     return replace(image, problem=replace(problem, settings=settings, target=target), why=why, notes=notes)
-
-
-def _thumbnail_psnr(target: FloatArray, size: tuple[int, int]) -> float:
-    """Return the PSNR of an image made smaller and enlarged again."""
-    return psnr_of(resize_linear(resize_area(target, size), target.shape[1::-1]), target)

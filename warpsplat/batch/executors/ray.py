@@ -29,14 +29,6 @@ PATIENCE = 20.0
 """Seconds without any worker before a warning."""
 
 
-def check_alive(nodes: int) -> None:
-    """Raise ``ResourceError`` if a cluster that nobody else adds nodes to has none left."""
-    if not nodes:
-        raise ResourceError(
-            "the Ray cluster of this machine has died, perhaps for lack of memory; the same command continues"
-        )
-
-
 class RayCluster(WorkerExecutor[RayWorker]):
     """Does tasks on a cluster."""
 
@@ -81,8 +73,9 @@ class RayCluster(WorkerExecutor[RayWorker]):
         self._begun = self._begun or now
         if now - self._asked > PAUSE:
             self._asked = now
-            if self._own:
-                check_alive(len(self._nodes()))
+            if self._own and not self._nodes():  # nobody else adds nodes to it
+                cause = "has died, perhaps for lack of memory; the same command continues"
+                raise ResourceError(f"the Ray cluster of this machine {cause}")
             for worker in self._busy():
                 worker.ask_progress()
             self._hire()
