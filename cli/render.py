@@ -18,7 +18,7 @@ from warpsplat.cli.options import (
     quiet_option,
     threads_option,
 )
-from warpsplat.errors import ImageError, UsageError
+from warpsplat.errors import UsageError, naming
 from warpsplat.extensions import renderer_names
 from warpsplat.fit.settings import DxfCurves
 from warpsplat.run.options import BY_NAME
@@ -69,7 +69,7 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
     check_format(output)
     if renderer != "viewer" and output.suffix.lower() != ".png":
         raise UsageError(f"--renderer {renderer} makes pixels: give an output that ends with .png")
-    try:
+    with naming(input_name(svg)):
         check_scale(svg_size(inspect_svg(text).root) or (1.0, 1.0), scale)
         if renderer != "viewer":
             from warpsplat.run.render import render
@@ -81,8 +81,6 @@ def command(svg: Path, scale: float, renderer: Any, dxf: DxfCurves | None, **giv
             write_result(output, mark_png(draw_png(text, zoom=scale)))
         else:
             write_named(output, text, zoom=scale, dxf=dxf or "arcs")
-    except ImageError as error:
-        raise ImageError(f"{input_name(svg)}: {error}") from error
     if not request.quiet:
         echo_unused_dxf(dxf, output)
     if not request.quiet and output != STANDARD:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +10,7 @@ import pytest
 
 import warpsplat
 from tests.fit.pictures import picture, step_for
+from tests.run.helpers import after
 from tests.scenes import random_scene, with_gradients
 from warpsplat.errors import UsageError
 from warpsplat.fit.densification import recover
@@ -30,12 +29,6 @@ CURVES = 12
 USUAL = {"curves": CURVES, "iterations": 100, "seed": 1, "subject": "photo", "device": "cpu"}
 LATE = 62
 """Steps after which such runs have their whole surplus."""
-
-
-def after(count: int) -> Callable[[], bool]:
-    """Return a function that is true from its ``count``-th call on."""
-    steps = itertools.count(1)
-    return lambda: next(steps) >= count
 
 
 @pytest.mark.parametrize(
