@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from warpsplat.errors import DeviceError
 from warpsplat.fit.budget import affordable
 from warpsplat.fit.densification import densify, recover
 from warpsplat.fit.problem import USUAL_ROUNDING, Fit, Problem, Rounding, Run, Start
@@ -14,7 +13,6 @@ from warpsplat.fit.rounding import evaluate_file, freeze_opacities, opacities_at
 from warpsplat.fit.saved import fit_content, fit_from, step_content
 from warpsplat.fit.schedule import CHECK_INTERVAL, EVALUATE_FROM, EVALUATE_INTERVAL, phase_at
 from warpsplat.fit.training import Training
-from warpsplat.rendering.failures import failures_of
 
 
 class Event(NamedTuple):
@@ -41,15 +39,10 @@ def fit(
         checkpoint.begin()
         if checkpoint.result:
             return fit_from(checkpoint.result, training.scene)
-    try:
-        with failures_of(run.backend.device):
-            return train(training)
-    except DeviceError as failure:
-        kept = training.kept()
-        if kept is None:
-            raise
-        run.failures.append(failure)
-        return kept
+    made = run.attempt(lambda: train(training)) or training.kept()
+    if made is None:
+        raise run.failures.pop()
+    return made
 
 
 def train(training: Training) -> Fit:

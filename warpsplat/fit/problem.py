@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from warpsplat.errors import DeviceError, Stopped
 from warpsplat.fit.checkpoint import Checkpoint
@@ -20,6 +20,8 @@ from warpsplat.scene import FloatArray, Scene
 if TYPE_CHECKING:
     from warpsplat.fit.state import Past
     from warpsplat.rendering.backend import Backend
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +131,17 @@ class Run:
         """Raise ``Stopped`` if the run has to end."""
         if self.over():
             raise Stopped
+
+    def attempt(self, work: Callable[[], Made]) -> Made | None:
+        """Return the result of work on the device; None if that failed, which is then one of ``failures``."""
+        from warpsplat.rendering.failures import failures_of  # imports Warp
+
+        try:
+            with failures_of(self.backend.device):
+                return work()
+        except DeviceError as failure:
+            self.failures.append(failure)
+            return None
 
     def report(self, progress: Progress) -> None:
         """Pass a progress report on."""

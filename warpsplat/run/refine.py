@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpsplat.errors import DeviceError, ImageError, naming
+from warpsplat.errors import ImageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource, held, source_name
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
@@ -24,7 +24,6 @@ from warpsplat.fit.settings import Density, Settings, make_settings, solid_color
 from warpsplat.metrics import decibels, score_svg
 from warpsplat.native import release_memory
 from warpsplat.rendering.compiler import compile_seconds
-from warpsplat.rendering.failures import failures_of
 from warpsplat.run.arguments import backend_on, check_keywords, custom_loss, takes
 from warpsplat.run.checkpoint import identity, open_checkpoint
 from warpsplat.run.figures import has_time_for_ssimulacra2, missed_goals
@@ -174,13 +173,9 @@ def _cleared(made: Fit, problem: Problem, run: Run) -> Fit:
     """Return a fit whose outlines are drawn back from where the image is empty, unless the device fails."""
     if problem.target.shape[2] != 4 or made.interrupted:
         return made
-    try:
-        with failures_of(run.backend.device):
-            scene = clear_empty(made.scene, problem.target, problem.settings, run, made.per_pixel)
-        return replace(made, scene=scene, interrupted=run.stopped())
-    except DeviceError as failure:
-        run.failures.append(failure)
-        return replace(made, interrupted=True)
+    target, settings = problem.target, problem.settings
+    scene = run.attempt(lambda: clear_empty(made.scene, target, settings, run, made.per_pixel))
+    return replace(made, scene=made.scene if scene is None else scene, interrupted=run.stopped())
 
 
 def _settings(settings: Settings, count: int) -> Settings:

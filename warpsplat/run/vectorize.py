@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from warpsplat.errors import DeviceError, UsageError, naming
+from warpsplat.errors import UsageError, naming
 from warpsplat.files.remote import path_of
 from warpsplat.files.sources import ImageSource
 from warpsplat.fit.checkpoint import SAVE_INTERVAL
@@ -239,29 +239,21 @@ def _made(problem: Problem, strategy: Strategy, run: Run) -> Fit:
     """Return what a strategy makes; of a drawing whose device fails, the trace alone, which needs none."""
     if strategy is not STRATEGIES["drawing"]:
         return strategy.make(problem, run)
-    from warpsplat.rendering.failures import failures_of
-
-    try:
-        with failures_of(run.backend.device):
-            return strategy.make(problem, run)
-    except DeviceError as failure:
-        made = STRATEGIES["draft"].make(problem.having(tidy=False), run)
-        run.failures.append(failure)
-        return replace(made, interrupted=True)
+    if found := run.attempt(lambda: strategy.make(problem, run)):
+        return found
+    failure = run.failures.pop()  # with which the draft would be stopped
+    made = STRATEGIES["draft"].make(problem.having(tidy=False), run)
+    run.failures.append(failure)
+    return replace(made, interrupted=True)
 
 
 def _arranged(made: Fit, problem: Problem, strategy: Strategy, run: Run) -> Fit:
     """Return ``arranged``, without what takes the device if that fails."""
-    if not strategy.uses_device:
-        return arranged(made, problem, strategy, run)
-    from warpsplat.rendering.failures import failures_of
-
-    try:
-        with failures_of(run.backend.device):
-            return arranged(made, problem, strategy, run)
-    except DeviceError as failure:
-        run.failures.append(failure)
-        return arranged(replace(made, interrupted=True), problem, strategy, run)
+    if strategy.uses_device:
+        if found := run.attempt(lambda: arranged(made, problem, strategy, run)):
+            return found
+        made = replace(made, interrupted=True)
+    return arranged(made, problem, strategy, run)
 
 
 def removal_notes(color: FloatArray | None, settings: Settings) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ removed or added, and the last steps repeated, until the file itself, as a viewe
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
-from warpsplat.errors import DeviceError
 from warpsplat.fit.budget import affordable_curves
 from warpsplat.fit.loop import fit
 from warpsplat.fit.place import simple_curves
@@ -17,7 +17,6 @@ from warpsplat.fit.problem import Fit, Problem, Rounding, Run
 from warpsplat.fit.rounding import DB_PER_DOUBLING, finest
 from warpsplat.fit.settings import PRESETS, Settings
 from warpsplat.portable import elementary
-from warpsplat.rendering.failures import failures_of
 from warpsplat.search.candidate import FEW_SHAPES, LAST_STEPS, Candidate, Change, changed, for_few, measured
 from warpsplat.svg.write import GRIDS
 
@@ -67,11 +66,8 @@ def search_goal(problem: Problem, run: Run) -> Fit:
         change = next_change(tried, settings)
         if change is None or run.over():
             break
-        try:
-            with failures_of(run.backend.device):
-                made = changed(problem, change, next(parts))
-        except DeviceError as failure:
-            run.failures.append(failure)
+        made = run.attempt(functools.partial(changed, problem, change, next(parts)))
+        if made is None:
             break
         done += made.iterations
         if made.interrupted:
