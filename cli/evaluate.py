@@ -47,9 +47,7 @@ def command(image: Path, svg: Path, **given: Any) -> None:
     if request.as_json:
         echo(json.dumps({"image": str(image), "svg": str(svg), **values, **hooks.as_dict()}))
         return
-    for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes"):
+    for name in ("psnr", "ssim", "ms_ssim", "ssimulacra2", "paths", "nodes", "bytes", "gzip_bytes"):
         value = f"{values[name]} dB" if name == "psnr" else values[name]
         missing = "exact" if name == "psnr" else "-"
         echo(f"{name:12}{missing if values[name] is None else value}")
-    echo(f"{'bytes':12}{values['bytes']}")
-    echo(f"{'gzip_bytes':12}{values['gzip_bytes']}")

@@ -115,21 +115,18 @@ class BatchDisplay:
             click.echo(CLEAR, nl=False, err=True)
         counts = self._shown_counts()
         if self._as_json:
-            echo(
-                json.dumps(
-                    {
-                        "images": self._total,
-                        **{name.replace(" ", "_"): n for name, n in counts.items()},
-                        "psnr_mean": round(fmean(self._psnr), 3) if self._psnr else None,
-                        "psnr_median": round(median(self._psnr), 3) if self._psnr else None,
-                        "bytes": sum(self._bytes),
-                        "seconds": round(sum(self._seconds), 3),
-                        "elapsed": round(elapsed, 2),
-                        "workers": workers,
-                        "manifest": str(manifest),
-                    }
-                )
-            )
+            values = {
+                "images": self._total,
+                **{name.replace(" ", "_"): n for name, n in counts.items()},
+                "psnr_mean": round(fmean(self._psnr), 3) if self._psnr else None,
+                "psnr_median": round(median(self._psnr), 3) if self._psnr else None,
+                "bytes": sum(self._bytes),
+                "seconds": round(sum(self._seconds), 3),
+                "elapsed": round(elapsed, 2),
+                "workers": workers,
+                "manifest": str(manifest),
+            }
+            echo(json.dumps(values))
         elif not self._quiet:
             did = ", ".join(f"{n} {name}" for name, n in counts.items())
             by = f", {counted(workers, 'worker')}" if workers > 1 else ""
