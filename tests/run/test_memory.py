@@ -204,6 +204,8 @@ def test_a_mask_counts_and_is_read_smaller_with_its_image() -> None:
     facts, of_mask = image_facts(data), image_facts(mask)
     assert facts and of_mask
     settings = make_settings(curves=4)
+    small = replace(of_mask, width=WIDTH // 4, height=HEIGHT // 4)
+    assert [Demand(facts, each).mask_factor(4) for each in (of_mask, small)] == [4, 1], "it keeps its detail"
     whole = Demand(facts, mask=of_mask).need(settings)
     assert whole > Demand(facts).need(settings)
     for limit, words in ((whole - 1, "processed at 33x25"), (whole, "")):

@@ -46,7 +46,7 @@ def fit(
 
 
 def train(training: Training) -> Fit:
-    """Make the steps of a fit, and return its result. All that happens between steps is an event."""
+    """Make the steps of a fit, and return its result. All but checkpoints and its end are events."""
     run, checkpoint = training.run, training.run.checkpoint
     training.begin()
     while True:

@@ -239,9 +239,10 @@ class Demand:
 
         It keeps the detail that the reduced image has.
         """
-        while self.mask and factor > 1 and self.mask.width // factor < self.facts.width // factor:
-            factor //= 2
-        return factor
+        found = factor
+        while self.mask and found > 1 and self.mask.width // found < self.facts.width // factor:
+            found //= 2
+        return found
 
     def lack(self, settings: Settings, factor: int = 1) -> Lack | None:
         """Return the memory that is short for a run; None if there is enough."""
