@@ -74,8 +74,6 @@ USAGE = [
     *[(f"{VALID['render']} --scale {scale}", "scale") for scale in ("0", "-1", "nan", "1e9", "1e308")],
     ("render good.svg -o a.png --scale 1e-9", "scale"),
     ("render many.svg -o a.png --scale 2", "scale 2.0 makes"),
-    ("bench --size 0x0", "size"),
-    ("bench --size 1x1", "size"),
     # Outputs
     *[(f"{line} -o none/a.png", "does not exist") for line in (*OPTIMISING, "render drawing.svg")],
     *[(f"{line} -o photo.png", "is the input itself") for line in OPTIMISING],

@@ -54,7 +54,7 @@ def test_bench_through_a_torch_without_cuda(monkeypatch: pytest.MonkeyPatch) -> 
     assert "cannot use cuda:0" in one_line(done.stderr)
 
 
-@pytest.mark.parametrize("size", ["0x10", "10", "16x", "99999x99999", "axb"])
+@pytest.mark.parametrize("size", ["0x10", "1x1", "10", "16x", "99999x99999", "axb"])
 def test_bench_refuses_odd_sizes(size: str, cli: Cli) -> None:
     assert "not a size" in cli("bench", "--size", size, code=2).line
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpsplat.errors import UsageError, printable
+from warpsplat.errors import UsageError, cause_of, printable
 from warpsplat.extensions import declared, load
 from warpsplat.fit.optics import WORDS
 from warpsplat.fit.options import QUOTED, Option, options_of, parse_palette
@@ -48,9 +48,7 @@ def read_value(name: str, path: Path, others: str) -> str:
             raise UsageError(f"{name} {printable(str(path))}: has more than {MOST_BYTES} bytes")
         return found.decode("ascii")
     except (OSError, ValueError) as error:
-        cause = error.strerror if isinstance(error, OSError) else "not text"
-        if isinstance(error, UnicodeEncodeError) or "\0" in str(path):
-            cause = "contains a character that file names cannot have"
+        cause = "not text" if isinstance(error, UnicodeDecodeError) else cause_of(error)
         raise UsageError(f"{name} {printable(str(path))}: {cause}; {others}") from error
 
 
