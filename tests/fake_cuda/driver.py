@@ -5,12 +5,11 @@ Names and arguments are those of ``warp/_src/context.py``; what each does is to 
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +41,9 @@ CURRENT = (1 << 64) - 1
 CONTEXT = 0xC0DE000
 """Handle of the context of device 0; those of the others follow."""
 
+WORD = 4
+"""Bytes of a number that is scanned or sorted: of int32, which the product's are."""
+
 MARK = "test device"
 """First words of what is compiled for it."""
 
@@ -68,12 +70,8 @@ class Driver:
         self.functions: dict[str, Callable[..., Any]] = {
             name: getattr(self, name) for name in dir(self) if name.startswith("wp_")
         }
-        for name in ZERO:
-            self.functions[name] = lambda *arguments: 0
-        for name, dtype in SCANNED.items():
-            self.functions[f"wp_array_scan_{name}_device"] = self.scan(dtype)
-        for name, dtype in SORTED.items():
-            self.functions[f"wp_radix_sort_pairs_{name}_device"] = self.sort(dtype)
+        for name, answer in ANSWERS.items():
+            self.functions[name] = lambda *_, answer=answer: answer
 
     @property
     def shift(self) -> int:
@@ -115,32 +113,14 @@ class Driver:
 
     # Devices and contexts
 
-    def wp_is_cuda_enabled(self) -> int:
-        return 1
-
-    def wp_cuda_driver_is_initialized(self) -> int:
-        return 1
-
     def wp_cuda_driver_version(self) -> int:
         return int(options.driver or self.real.wp_cuda_toolkit_version())
 
     def wp_cuda_device_get_count(self) -> int:
         return options.devices
 
-    def wp_cuda_device_get_name(self, device: int) -> bytes:
-        return b"Test device"
-
     def wp_cuda_device_get_arch(self, device: int) -> int:
         return options.arch
-
-    def wp_cuda_device_get_sm_count(self, device: int) -> int:
-        return 132
-
-    def wp_cuda_device_get_max_shared_memory(self, device: int) -> int:
-        return 232448
-
-    def wp_cuda_device_is_uva(self, device: int) -> int:
-        return 1
 
     def wp_cuda_device_is_mempool_supported(self, device: int) -> int:
         return int(options.pools)
@@ -172,12 +152,10 @@ class Driver:
         """Number of its device."""
         return (self.context or CONTEXT) - CONTEXT
 
-    @contextlib.contextmanager
-    def within(self, context: int | None) -> Iterator[None]:
+    def enter(self, context: int | None) -> None:
         """Make a context current, and leave it so, as ``ContextGuard`` does."""
         if context is not None:
             self.thread.context = context
-        yield
 
     def wp_cuda_context_get_current(self) -> int | None:
         return self.context
@@ -194,9 +172,6 @@ class Driver:
 
     def wp_cuda_context_get_device_ordinal(self, context: int | None) -> int:
         return (context or CONTEXT) - CONTEXT
-
-    def wp_cuda_context_is_primary(self, context: int) -> int:
-        return 1
 
     def wp_cuda_context_check(self, context: int) -> int:
         return self.machine.failed
@@ -225,12 +200,6 @@ class Driver:
         if stream:  # its work is done all the same
             self.machine.wait_for(stream, self.machine.now())
             del self.machine.streams[handle]
-
-    def wp_cuda_stream_register(self, context: int, handle: int) -> None:
-        """Streams of other libraries are made by ``new_stream`` of the machine."""
-
-    def wp_cuda_stream_unregister(self, context: int, handle: int) -> None:
-        """See ``wp_cuda_stream_register``."""
 
     def wp_cuda_stream_is_blocking(self, handle: int) -> int:
         return int(self.stream(handle).blocking)
@@ -283,9 +252,6 @@ class Driver:
         self.machine.check_context()
         return True
 
-    def wp_cuda_event_query(self, event: int) -> int:
-        return 0
-
     def wp_cuda_event_elapsed_time(self, begin: int, end: int) -> float:
         return 1e3 * (self.events[end].time - self.events[begin].time)
 
@@ -303,21 +269,21 @@ class Driver:
         return block
 
     def wp_alloc_device_default(self, context: int, size: int, tag: Any) -> int:
-        with self.within(context):
-            self.machine.check_context()
-            self.machine.forbid_in_capture()
-            return self.allocate(size).address
+        self.enter(context)
+        self.machine.check_context()
+        self.machine.forbid_in_capture()
+        return self.allocate(size).address
 
     def wp_alloc_device_async(self, context: int, size: int, handle: int, tag: Any) -> int:
-        with self.within(context):
-            self.machine.check_context()
-            stream = self.stream(handle)
-            self.machine.check_legacy(stream)
-            block = self.allocate(size)
-            if stream.capture:
-                block.capture = stream.capture
-                self.machine.submit(stream, lambda: self.machine.region.fill(block, NEW))
-            return block.address
+        self.enter(context)
+        self.machine.check_context()
+        stream = self.stream(handle)
+        self.machine.check_legacy(stream)
+        block = self.allocate(size)
+        if stream.capture:
+            block.capture = stream.capture
+            self.machine.submit(stream, lambda: self.machine.region.fill(block, NEW))
+        return block.address
 
     def free(self, address: int, finish: bool) -> None:
         """Free a block: ``cudaFree``, which waits (``finish``), or ``cudaFreeAsync`` on the legacy stream."""
@@ -356,71 +322,66 @@ class Driver:
     def wp_free_pinned(self, address: int) -> None:
         self.real.wp_free_host(address)
 
-    def wp_cuda_pointer_get_memory_kind(self, *arguments: Any) -> int:
-        return 4
-
     def wp_memcpy_h2d(self, context: int, to: int, source: int, size: int, handle: int) -> bool:
-        with self.within(context):
-            self.check("wp_memcpy_h2d", (to, size, "target"))
-            self.check_host("wp_memcpy_h2d", source)
-            stream = self.stream(handle)
-            if stream.capture:
-                report("a copy from the host in a capture: the graph keeps the host's address")
-            data = ctypes.string_at(source, size)  # memory that is not pinned is copied at once
-            self.machine.submit(stream, lambda: ctypes.memmove(to + self.shift, data, size))
-            return True
+        self.enter(context)
+        self.check("wp_memcpy_h2d", (to, size, "target"))
+        self.check_host("wp_memcpy_h2d", source)
+        stream = self.stream(handle)
+        if stream.capture:
+            report("a copy from the host in a capture: the graph keeps the host's address")
+        data = ctypes.string_at(source, size)  # memory that is not pinned is copied at once
+        self.machine.submit(stream, lambda: ctypes.memmove(to + self.shift, data, size))
+        return True
 
     def wp_memcpy_d2h(self, context: int, to: int, source: int, size: int, handle: int) -> bool:
-        with self.within(context):
-            self.check("wp_memcpy_d2h", (source, size, "source"))
-            self.check_host("wp_memcpy_d2h", to)
-            stream = self.stream(handle)
-            if stream.capture:
-                self.machine.invalidate(CAPTURE_UNSUPPORTED)
-            self.machine.submit(stream, lambda: ctypes.memmove(to, source + self.shift, size))
-            self.machine.wait_for(stream, self.machine.now())  # memory that is not pinned
-            self.machine.check_context()
-            return True
+        self.enter(context)
+        self.check("wp_memcpy_d2h", (source, size, "source"))
+        self.check_host("wp_memcpy_d2h", to)
+        stream = self.stream(handle)
+        if stream.capture:
+            self.machine.invalidate(CAPTURE_UNSUPPORTED)
+        self.machine.submit(stream, lambda: ctypes.memmove(to, source + self.shift, size))
+        self.machine.wait_for(stream, self.machine.now())  # memory that is not pinned
+        self.machine.check_context()
+        return True
 
     def wp_memcpy_d2d(self, context: int, to: int, source: int, size: int, handle: int) -> bool:
-        with self.within(context):
-            self.check("wp_memcpy_d2d", (to, size, "target"), (source, size, "source"))
-            shift = self.shift
-            self.machine.submit(self.stream(handle), lambda: ctypes.memmove(to + shift, source + shift, size))
-            return True
+        self.enter(context)
+        self.check("wp_memcpy_d2d", (to, size, "target"), (source, size, "source"))
+        shift = self.shift
+        self.machine.submit(self.stream(handle), lambda: ctypes.memmove(to + shift, source + shift, size))
+        return True
 
     def wp_memset_device(self, context: int, to: int, value: int, size: int, handle: int) -> bool:
-        with self.within(context):
-            self.check("wp_memset_device", (to, size, "target"))
-            self.machine.submit(self.stream(handle), lambda: ctypes.memset(to + self.shift, value, size))
-            return True
+        self.enter(context)
+        self.check("wp_memset_device", (to, size, "target"))
+        self.machine.submit(self.stream(handle), lambda: ctypes.memset(to + self.shift, value, size))
+        return True
 
     def wp_memtile_device(self, context: int, to: int, source: Any, size: int, count: int) -> None:
-        with self.within(context):
-            self.check("wp_memtile_device", (to, size * count, "target"))
-            data = ctypes.string_at(ctypes.cast(source, ctypes.c_void_p), size) * count
-            self.machine.submit(
-                self.stream(CURRENT), lambda: ctypes.memmove(to + self.shift, data, len(data))
-            )
+        self.enter(context)
+        self.check("wp_memtile_device", (to, size * count, "target"))
+        data = ctypes.string_at(ctypes.cast(source, ctypes.c_void_p), size) * count
+        self.machine.submit(self.stream(CURRENT), lambda: ctypes.memmove(to + self.shift, data, len(data)))
 
     def wp_array_copy_device(self, context: int, to: Any, source: Any, *rest: int) -> bool:
-        with self.within(context):
-            arrays = [type(array.contents).from_buffer_copy(array.contents) for array in (to, source)]
-            for array in arrays:
-                self.machine.region.show(array)
-            pointers = [ctypes.pointer(array) for array in arrays]
-            copy = self.real.wp_array_copy_host
-            self.machine.submit(self.stream(CURRENT), lambda: copy(*pointers, *rest))
-            return True
+        self.enter(context)
+        arrays = [type(array.contents).from_buffer_copy(array.contents) for array in (to, source)]
+        for array in arrays:
+            self.machine.region.show(array)
+        pointers = [ctypes.pointer(array) for array in arrays]
+        copy = self.real.wp_array_copy_host
+        self.machine.submit(self.stream(CURRENT), lambda: copy(*pointers, *rest))
+        return True
 
     def wp_array_fill_device(self, context: int, array: Any, kind: int, value: Any, size: int) -> None:
-        with self.within(context):
-            target = type(array.contents).from_buffer_copy(array.contents)
-            self.machine.region.show(target)
-            to = ctypes.pointer(target)
-            what = ctypes.pointer(type(value.contents).from_buffer_copy(value.contents))
-            fill = self.real.wp_array_fill_host
-            self.machine.submit(self.stream(CURRENT), lambda: fill(to, kind, what, size))
+        self.enter(context)
+        target = type(array.contents).from_buffer_copy(array.contents)
+        self.machine.region.show(target)
+        to = ctypes.pointer(target)
+        what = ctypes.pointer(type(value.contents).from_buffer_copy(value.contents))
+        fill = self.real.wp_array_fill_host
+        self.machine.submit(self.stream(CURRENT), lambda: fill(to, kind, what, size))
 
     # Scans and sorts, which take scratch memory
 
@@ -431,47 +392,36 @@ class Driver:
             self.machine.invalidate(CAPTURE_UNSUPPORTED)
         return stream
 
-    def scan(self, dtype: type[np.generic]) -> Callable[..., bool]:
-        """Return ``wp_array_scan`` for numbers of a type."""
-        size, typed = np.dtype(dtype).itemsize, self.machine.region.typed
+    def wp_array_scan_int_device(
+        self, source: int, to: int, count: int, step: int, to_step: int, length: int, inclusive: bool
+    ) -> bool:
+        assert step == to_step == WORD and length == 1, "the test device knows dense arrays of scalars"
+        self.check("wp_array_scan", (source, count * WORD, "source"), (to, count * WORD, "target"))
+        typed = self.machine.region.typed
 
-        def function(
-            source: int, to: int, count: int, step: int, to_step: int, length: int, inclusive: bool
-        ) -> bool:
-            assert step == to_step == size and length == 1, "the test device knows dense arrays of scalars"
-            self.check("wp_array_scan", (source, count * size, "source"), (to, count * size, "target"))
+        def work() -> None:
+            sums = np.cumsum(typed(source, count, np.int32), dtype=np.int32)
+            typed(to, count, np.int32)[:] = sums if inclusive else np.append(np.int32(), sums[:-1])
 
-            def work() -> None:
-                sums = np.cumsum(typed(source, count, dtype), dtype=dtype)
-                typed(to, count, dtype)[:] = sums if inclusive else np.append(dtype(), sums[:-1])
+        self.machine.submit(self.scratch(), work)
+        return True
 
-            self.machine.submit(self.scratch(), work)
-            return True
+    def wp_radix_sort_pairs_int_device(
+        self, keys: int, values: int, count: int, begin: int, end: int, value_size: int = WORD
+    ) -> None:
+        self.check("wp_radix_sort_pairs", (keys, 2 * count * WORD, "keys"))
+        self.check("wp_radix_sort_pairs", (values, 2 * count * value_size, "values"))
+        typed = self.machine.region.typed
 
-        return function
+        def work() -> None:
+            key, value = typed(keys, 2 * count, np.int32), typed(values, 2 * count, f"i{value_size}")
+            bits = key[:count].view(np.uint32) >> np.uint32(begin) & np.uint32((1 << (end - begin)) - 1)
+            order = np.argsort(bits, kind="stable")
+            key[:count], value[:count] = key[:count][order], value[:count][order]
+            for half in (key[count:], value[count:]):  # CUB leaves what it likes there
+                half.view(np.uint32)[:] = FREED
 
-    def sort(self, dtype: type[np.generic]) -> Callable[..., None]:
-        """Return ``wp_radix_sort_pairs`` for keys of a type; values are words."""
-        size, typed = np.dtype(dtype).itemsize, self.machine.region.typed
-
-        def function(keys: int, values: int, count: int, begin: int, end: int, value_size: int = 4) -> None:
-            self.check("wp_radix_sort_pairs", (keys, 2 * count * size, "keys"))
-            self.check("wp_radix_sort_pairs", (values, 2 * count * value_size, "values"))
-
-            def work() -> None:
-                key, value = typed(keys, 2 * count, dtype), typed(values, 2 * count, f"i{value_size}")
-                bits = key[:count].copy()
-                if np.issubdtype(dtype, np.integer) and end - begin < 8 * size:
-                    bits = bits.view(f"u{size}").astype(np.uint64)
-                    bits = bits >> np.uint64(begin) & np.uint64((1 << (end - begin)) - 1)
-                order = np.argsort(bits, kind="stable")
-                key[:count], value[:count] = key[:count][order], value[:count][order]
-                for half in (key[count:], value[count:]):  # CUB leaves what it likes there
-                    half.view(np.uint32)[:] = FREED
-
-            self.machine.submit(self.scratch(), work)
-
-        return function
+        self.machine.submit(self.scratch(), work)
 
     # Modules and kernels
 
@@ -487,17 +437,17 @@ class Driver:
         return 0
 
     def wp_cuda_load_module(self, context: int, path: bytes) -> int:
-        with self.within(context):
-            file = Path(path.decode())
-            text = file.read_text(errors="replace") if file.exists() else ""
-            arch = int(text.removeprefix(MARK)) if text.startswith(MARK) else 0
-            fits = arch <= options.arch if file.suffix == ".ptx" else arch // 10 == options.arch // 10
-            if options.fail == "load" or not arch or not fits:
-                raise CudaError(INVALID_IMAGE)
-            if self.machine.captures and self.wp_cuda_driver_version() < 12030:
-                self.machine.invalidate(CAPTURE_UNSUPPORTED)
-            self.modules.add(handle := next(self.machine.handles))
-            return handle
+        self.enter(context)
+        file = Path(path.decode())
+        text = file.read_text(errors="replace") if file.exists() else ""
+        arch = int(text.removeprefix(MARK)) if text.startswith(MARK) else 0
+        fits = arch <= options.arch if file.suffix == ".ptx" else arch // 10 == options.arch // 10
+        if options.fail == "load" or not arch or not fits:
+            raise CudaError(INVALID_IMAGE)
+        if self.machine.captures and self.wp_cuda_driver_version() < 12030:
+            self.machine.invalidate(CAPTURE_UNSUPPORTED)
+        self.modules.add(handle := next(self.machine.handles))
+        return handle
 
     def wp_cuda_unload_module(self, context: int, module: int) -> None:
         self.modules.discard(module)
@@ -506,51 +456,48 @@ class Driver:
         assert module in self.modules
         return next(self.machine.handles)
 
-    def wp_cuda_configure_kernel_shared_memory(self, kernel: int, size: int) -> bool:
-        return True
-
     def wp_cuda_launch_kernel(self, context: int, handle: int, *rest: Any) -> int:
         parameters, stream_handle = rest[6], rest[7]
-        with self.within(context):
-            self.machine.check_context()
-            self.launches += 1
-            fault, _, number = options.fail.partition(":")
-            if number and self.launches >= int(number):
-                self.machine.failed = {"launch": LAUNCH_FAILURE, "sync": ILLEGAL_ADDRESS}[fault]
-                if fault == "launch":
-                    self.machine.check_context()
-                return 0
-            kernel = self.kernels[handle]
-            bounds, arguments, touched = kernel.arguments(parameters)
-            try:
-                self.check(kernel.key, *touched)
-            except CudaError:  # of a launch nobody hears before something waits for it
-                self.machine.failed = ILLEGAL_ADDRESS
-                return 0
-            self.machine.region.show(arguments)
-
-            def work() -> None:
-                for address, size, what in touched:  # a graph may have been launched later
-                    wrong = self.machine.region.fault(address, size, self.device)
-                    if wrong:
-                        report(f"{kernel.key}, {what}: {wrong}")
-                        self.machine.failed = ILLEGAL_ADDRESS
-                        return
-                kernel.function(ctypes.byref(bounds), ctypes.byref(arguments))
-
-            self.machine.submit(self.stream(stream_handle), work)
+        self.enter(context)
+        self.machine.check_context()
+        self.launches += 1
+        fault, _, number = options.fail.partition(":")
+        if number and self.launches >= int(number):
+            self.machine.failed = {"launch": LAUNCH_FAILURE, "sync": ILLEGAL_ADDRESS}[fault]
+            if fault == "launch":
+                self.machine.check_context()
             return 0
+        kernel = self.kernels[handle]
+        bounds, arguments, touched = kernel.arguments(parameters)
+        try:
+            self.check(kernel.key, *touched)
+        except CudaError:  # of a launch nobody hears before something waits for it
+            self.machine.failed = ILLEGAL_ADDRESS
+            return 0
+        self.machine.region.show(arguments)
+
+        def work() -> None:
+            for address, size, what in touched:  # a graph may have been launched later
+                wrong = self.machine.region.fault(address, size, self.device)
+                if wrong:
+                    report(f"{kernel.key}, {what}: {wrong}")
+                    self.machine.failed = ILLEGAL_ADDRESS
+                    return
+            kernel.function(ctypes.byref(bounds), ctypes.byref(arguments))
+
+        self.machine.submit(self.stream(stream_handle), work)
+        return 0
 
     # Graphs
 
     def wp_cuda_graph_begin_capture(self, context: int, handle: int, external: int, mode: int) -> bool:
-        with self.within(context):
-            stream = self.stream(handle)
-            if options.fail == "capture" or stream.handle == 0 or stream.capture:
-                raise CudaError(CAPTURE_UNSUPPORTED)
-            stream.capture = Capture(next(self.machine.handles), mode, threading.get_ident())
-            self.machine.captures[stream.capture.id] = stream.capture
-            return True
+        self.enter(context)
+        stream = self.stream(handle)
+        if options.fail == "capture" or stream.handle == 0 or stream.capture:
+            raise CudaError(CAPTURE_UNSUPPORTED)
+        stream.capture = Capture(next(self.machine.handles), mode, threading.get_ident())
+        self.machine.captures[stream.capture.id] = stream.capture
+        return True
 
     def wp_cuda_graph_end_capture(self, context: int, handle: int, graph: Any) -> bool:
         stream = self.stream(handle)
@@ -595,32 +542,34 @@ class Driver:
     wp_cuda_graph_exec_destroy = wp_cuda_graph_destroy
 
 
-ZERO = {
-    "wp_cuda_stream_get_priority",
-    "wp_cuda_get_kernel_static_shared_memory",
-    "wp_cuda_timing_begin",
-    "wp_cuda_device_get_mempool_used_mem_high",
-    "wp_cuda_device_is_ipc_supported",
-    *(
-        f"wp_cuda_device_get_{name}"
-        for name in (
-            "pci_domain_id",
-            "pci_bus_id",
-            "pci_device_id",
-            "pageable_memory_access",
-            "host_native_atomic_supported",
-            "direct_managed_mem_access_from_host",
-            "managed_memory_supported",
-            "concurrent_managed_access_supported",
-        )
+ANSWERS: dict[str, Any] = {
+    "wp_is_cuda_enabled": 1,
+    "wp_cuda_driver_is_initialized": 1,
+    "wp_cuda_device_get_name": b"Test device",
+    "wp_cuda_device_get_sm_count": 132,
+    "wp_cuda_device_get_max_shared_memory": 232448,
+    "wp_cuda_device_is_uva": 1,
+    "wp_cuda_context_is_primary": 1,
+    "wp_cuda_pointer_get_memory_kind": 4,
+    "wp_cuda_configure_kernel_shared_memory": True,
+    "wp_cuda_stream_register": None,  # streams of other libraries are made by ``Machine.new_stream``
+    "wp_cuda_stream_unregister": None,
+    **dict.fromkeys(
+        [
+            f"wp_cuda_{name}"
+            for name in (
+                *("event_query", "stream_get_priority", "get_kernel_static_shared_memory", "timing_begin"),
+                *("is_peer_access_supported", "device_is_ipc_supported", "device_get_mempool_used_mem_high"),
+                *("device_get_pci_domain_id", "device_get_pci_bus_id", "device_get_pci_device_id"),
+                *("device_get_pageable_memory_access", "device_get_host_native_atomic_supported"),
+                *("device_get_direct_managed_mem_access_from_host", "device_get_managed_memory_supported"),
+                "device_get_concurrent_managed_access_supported",
+            )
+        ],
+        0,
     ),
-    "wp_cuda_is_peer_access_supported",
 }
-"""Functions whose answer is 0 here."""
+"""Functions whose answer is always the same."""
 
 REAL = {"wp_cuda_toolkit_version"}
 """Functions of CUDA that need no GPU."""
-
-SCANNED = {"int": np.int32, "int64": np.int64, "float": np.float32, "double": np.float64}
-SORTED = {**SCANNED, "uint": np.uint32, "uint64": np.uint64}
-"""Types of numbers by their names in Warp's functions."""

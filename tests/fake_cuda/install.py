@@ -140,13 +140,11 @@ class Finder(importlib.abc.MetaPathFinder):
 
 
 def finish() -> None:
-    """Do the work that is left, if Warp was started, and look for writes beside blocks."""
+    """Do the work that is left, if Warp was started."""
     with lock:
         for machine in [each.machine for each in _started]:
             for number in range(len(machine.legacy)):
                 machine.finish_all(number)
-            for block in list(machine.region.blocks.values()):
-                machine.region.check_guards(block)
 
 
 def install() -> None:

@@ -1,4 +1,4 @@
-"""Device memory: addresses that host code cannot touch, and the memory behind them, with guards.
+"""Device memory: addresses that host code cannot touch, and the memory behind them.
 
 What nobody wrote and what was freed holds floats that are not numbers. A block that was freed is not used
 again before ``KEPT_BACK`` others of its size, so that whoever still uses it reads those.
@@ -17,12 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.fake_cuda import options
-from tests.fake_cuda.rules import report
 
-NEW, FREED, GUARD = 0x7FC0BEEF, 0x7FDEAD00, 0x5AFE5AFE
-"""Words of memory that was never written, of freed memory (both not a number), and of guards."""
-
-GUARD_BYTES = 256
+NEW, FREED = 0x7FC0BEEF, 0x7FDEAD00
+"""Words of memory that was never written and of freed memory, neither of them a number."""
 
 KEPT_BACK = 8
 
@@ -51,7 +48,7 @@ class Block:
     size: int
     """Bytes that were asked for."""
     room: int
-    """Bytes that it takes with its guards; 0: it is memory of PyTorch's."""
+    """Bytes that it takes; 0: it is memory of PyTorch's."""
     device: int
     capture: object = None
     """The capture of which it became part."""
@@ -100,15 +97,14 @@ class Region:
         """Return a new block, or None where memory is short."""
         if self.used[device] + size > options.memory:
             return None
-        room = -(-max(size, 1) // 512) * 512 + 2 * GUARD_BYTES
+        room = -(-max(size, 1) // 512) * 512
         if len(self.spare[room]) > KEPT_BACK or self.top + room > self.base + self.size:
             if not self.spare[room]:
                 return None
             start = self.spare[room].popleft()
         else:
             start, self.top = self.top, self.top + room
-        block = Block(start + GUARD_BYTES, size, room, device)
-        self.words(start, room // 4)[:] = GUARD
+        block = Block(start, size, room, device)
         self.fill(block, NEW)
         self.add(block)
         self.used[device] += size
@@ -125,21 +121,11 @@ class Region:
 
     def release(self, block: Block) -> None:
         """Give the memory of a block back."""
-        self.check_guards(block)
         self.fill(block, FREED)
         del self.blocks[block.address]
         del self.addresses[bisect.bisect_left(self.addresses, block.address)]
         self.used[block.device] -= block.size
-        self.spare[block.room].append(block.address - GUARD_BYTES)
-
-    def check_guards(self, block: Block) -> None:
-        """Report a write beside a block."""
-        if not block.room:
-            return
-        start, end = block.address - GUARD_BYTES, block.address + block.rounded
-        after = self.words(end, (start + block.room - end) // 4)
-        if (self.words(start, GUARD_BYTES // 4) != GUARD).any() or (after != GUARD).any():
-            report(f"a write beside a block of {block.size} bytes")
+        self.spare[block.room].append(block.address)
 
     def find(self, address: int) -> Block | None:
         """Return the block that holds an address, unless it was given back."""

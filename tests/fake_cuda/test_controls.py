@@ -10,8 +10,6 @@ import pytest
 from tests import fake_cuda
 from tests.fake_cuda.controls import CONTROLS
 
-NAMES = [control.__name__ for control in CONTROLS]
-
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, list[str]]:
@@ -21,12 +19,12 @@ def found() -> dict[str, list[str]]:
     return answer
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CONTROLS)
 def test_what_is_wrong_is_found(found: dict[str, list[str]], name: str) -> None:
     assert found[f"{name}, wrong"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", CONTROLS)
 def test_what_is_right_is_let_pass(found: dict[str, list[str]], name: str) -> None:
     assert not found[f"{name}, right"]
 
