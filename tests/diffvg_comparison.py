@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
+import statistics
 import sys
 import time
 from collections import defaultdict
@@ -20,7 +21,9 @@ from typing import Any, NamedTuple
 
 import torch
 
+from tests.overheads import SCENES, pydiffvg_passes
 from warpsplat import pydiffvg
+from warpsplat.tools.bench import bench_scene
 
 Tensor = torch.Tensor
 Tensors = dict[str, Tensor]
@@ -291,43 +294,25 @@ def compare_gradients(theirs: ModuleType) -> None:
 
 
 def compare_times(theirs: ModuleType) -> None:
-    """Print processor seconds of serialisation, forward and backward pass."""
+    """Print processor seconds of serialisation, forward and backward pass, of the scenes of bench."""
     print(f"\n| step | warpsplat | DiffVG | ratio |\n|{'---|' * 4}")
-    for count, width, height in ((128, 384, 256), (512, 768, 512)):
-        for is_closed in (True, False):
-            seconds = [step_time(pd, count, width, height, is_closed=is_closed) for pd in (pydiffvg, theirs)]
-            what = f"{count} {'closed' if is_closed else 'open'} paths, {width}x{height}"
-            print(f"| {what} | {seconds[0]:.4f} s | {seconds[1]:.3f} s | {seconds[1] / seconds[0]:.0f} |")
+    for kind, count, (width, height) in SCENES:
+        scene, grad = bench_scene(kind, count, (width, height), 0.9, 0), torch.ones(height, width, 4)
+        ours, others = (pydiffvg_passes(scene, grad, 1, pd) for pd in (pydiffvg, theirs))
+        ours()
+        seconds = median_time(ours, 9), median_time(others, 1)
+        what = f"{count} {kind} paths, {width}x{height}"
+        print(f"| {what} | {seconds[0]:.4f} s | {seconds[1]:.3f} s | {seconds[1] / seconds[0]:.0f} |")
 
 
-def step_time(pd: ModuleType, count: int, width: int, height: int, *, is_closed: bool) -> float:
-    generator = torch.Generator().manual_seed(0)
-    shapes, groups = [], []
-    outline = tensor([[-1, 0], [-1, -1.3], [1, -1.3], [1, 0], [1, 1.3], [-1, 1.3]])
-    for number in range(count):
-        center = torch.rand(2, generator=generator) * tensor(width, height)
-        points = center + 0.06 * width * (outline + 0.3 * torch.randn(6, 2, generator=generator))
-        if not is_closed:
-            points = points[:4]
-        color = torch.rand(4, generator=generator).requires_grad_()
-        numbers = counts(2, 2) if is_closed else counts(2)
-        shapes.append(pd.Path(numbers, points.requires_grad_(), is_closed, stroke_width=tensor(1.5)))
-        paints = (color, None) if is_closed else (None, color)
-        groups.append(pd.ShapeGroup(counts(number), paints[0], stroke_color=paints[1]))
-
-    def step() -> None:
-        scene = pd.RenderFunction.serialize_scene(width, height, shapes, groups)
-        pd.RenderFunction.apply(width, height, 2, 2, 0, None, *scene).square().sum().backward()
-
-    repeats = 9 if pd is pydiffvg else 1
-    for _ in range(2 if pd is pydiffvg else 0):
-        step()
+def median_time(work: Callable[[], None], repeats: int) -> float:
+    """Return the median of the processor time [s]."""
     times = []
     for _ in range(repeats):
         began = time.process_time()
-        step()
+        work()
         times.append(time.process_time() - began)
-    return sorted(times)[len(times) // 2]
+    return statistics.median(times)
 
 
 def main() -> None:

@@ -23,6 +23,7 @@ from typing import NamedTuple
 from tests import ROOT
 from tests.golden.__main__ import EXPECTED
 from tests.golden.cases import CASES
+from tests.golden.processors import SETTINGS
 
 EMULATED_CASES = ("photo closed", "photo open", "photo splat", "drawing", "line", "pixel")
 """Cases made under emulation where none are named; all take hours."""
@@ -41,12 +42,9 @@ class Machine(NamedTuple):
 
 
 CONFIGURED = {
-    "unchanged": Machine(),
     "2 threads": Machine(threads=2),
     "5 threads": Machine(threads=5),
-    "NumPy without AVX-512": Machine({"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL"}),
-    "NumPy without AVX2": Machine({"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL"}),
-    "OpenBLAS for Nehalem": Machine({"OPENBLAS_CORETYPE": "Nehalem"}),
+    **{name: Machine(environment) for name, environment in SETTINGS.items()},
     "OpenBLAS for Haswell": Machine({"OPENBLAS_CORETYPE": "Haswell"}),
     "OpenBLAS for Skylake-X": Machine({"OPENBLAS_CORETYPE": "SkylakeX"}),
     "OpenCV with SSE3": Machine(

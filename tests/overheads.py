@@ -70,10 +70,13 @@ class Copy(torch.autograd.Function):
         return tuple(_unflatten_dense_tensors(grad, ctx.like))
 
 
-def diffvg_scene(scene: Scene) -> tuple[list[pydiffvg.Path], list[pydiffvg.ShapeGroup], list[torch.Tensor]]:
-    """Return shapes and groups, with tensors of their own, and those that require gradients."""
-    shapes: list[pydiffvg.Path] = []
-    groups: list[pydiffvg.ShapeGroup] = []
+def diffvg_scene(scene: Scene, package: Any = pydiffvg) -> tuple[list[Any], list[Any], list[torch.Tensor]]:
+    """Return shapes and groups, with tensors of their own, and those that require gradients.
+
+    ``package``: ours, or DiffVG's own.
+    """
+    shapes: list[Any] = []
+    groups: list[Any] = []
     leaves: list[torch.Tensor] = []
     for i in range(len(scene)):
         is_fill = scene.kind[i] == Kind.FILL
@@ -81,10 +84,11 @@ def diffvg_scene(scene: Scene) -> tuple[list[pydiffvg.Path], list[pydiffvg.Shape
         color = torch.tensor([*scene.colors[i], scene.opacities[i]], requires_grad=True)
         width = torch.tensor(float(scene.widths[i]) / 2, requires_grad=not is_fill)
         counts = torch.full((len(points) // 3,), 2, dtype=torch.int32)
-        shapes.append(pydiffvg.Path(counts, points, bool(is_fill), width))
+        shapes.append(package.Path(counts, points, bool(is_fill), width))
         fill, stroke = (color, None) if is_fill else (None, color)
         even_odd = scene.rule[i] == Rule.EVENODD
-        groups.append(pydiffvg.ShapeGroup(torch.tensor([i]), fill, even_odd, stroke_color=stroke))
+        ids = torch.tensor([i], dtype=torch.int32)
+        groups.append(package.ShapeGroup(ids, fill, even_odd, stroke_color=stroke))
         leaves += [points, color] if is_fill else [points, color, width]
     return shapes, groups, leaves
 
@@ -100,14 +104,16 @@ def leaf_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callabl
     return run
 
 
-def pydiffvg_passes(scene: Scene, image_grad: torch.Tensor, threads: int) -> Callable[[], None]:
-    """Return the passes through ``warpsplat.pydiffvg``, which uses as many threads as torch."""
-    shapes, groups, leaves = diffvg_scene(scene)
+def pydiffvg_passes(
+    scene: Scene, image_grad: torch.Tensor, threads: int, package: Any = pydiffvg
+) -> Callable[[], None]:
+    """Return the passes through ``warpsplat.pydiffvg``, which uses as many threads as torch, or DiffVG."""
+    shapes, groups, leaves = diffvg_scene(scene, package)
     size = scene.canvas.width, scene.canvas.height
 
     def run() -> None:
-        arguments = pydiffvg.RenderFunction.serialize_scene(*size, shapes, groups)
-        image = pydiffvg.RenderFunction.apply(*size, 2, 2, 0, None, *arguments)
+        arguments = package.RenderFunction.serialize_scene(*size, shapes, groups)
+        image = package.RenderFunction.apply(*size, 2, 2, 0, None, *arguments)
         torch.autograd.grad(image, leaves, image_grad)
 
     return run

@@ -121,7 +121,7 @@ def test_mixed_line_art_keeps_its_areas(device: str) -> None:
     assert scored(result).psnr > (34 if result.scene.point_counts()[0] == 12 else 42)
 
 
-def test_without_areas_all_is_strokes_a_disc_a_dot_and_the_rest_rings(device: str) -> None:
+def test_without_areas_everything_is_drawn_with_strokes(device: str) -> None:
     disc = lines_of(drawn(BLOB), device)
     assert (disc.scene.kind == Kind.STROKE).all()
     assert len(disc.scene) == 3

@@ -81,7 +81,7 @@ def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
 
-def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_linear_light_must_explain_the_image_clearly_better(monkeypatch: pytest.MonkeyPatch) -> None:
     """A picture may look as if its colours were mixed in linear light when they were not."""
     monkeypatch.setattr(optics_module, "find_edges", partial(find_edges, is_linear=True))
     for image, is_linear in ((small(Image.Resampling.HAMMING), False), (in_linear_light(), True)):
@@ -90,7 +90,7 @@ def test_linear_light_has_to_explain_clearly_more(monkeypatch: pytest.MonkeyPatc
         assert (found is not seen) == is_linear
 
 
-def test_a_kernel_is_found_where_colours_only_look_mixed_in_linear_light(
+def test_a_blur_is_found_although_colours_look_mixed_in_linear_light(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def voted(image: FloatArray, noise: float = 0.0, *, is_linear: bool | None = None) -> Edges:
@@ -104,7 +104,7 @@ def test_a_kernel_is_found_where_colours_only_look_mixed_in_linear_light(
 
 
 @pytest.mark.parametrize(("second", "traces"), [(100.1, 4), (99.9, 6)])
-def test_linear_light_is_given_up_after_two_turns_that_explain_no_more(
+def test_linear_light_is_given_up_after_two_turns_without_gain(
     monkeypatch: pytest.MonkeyPatch, second: float, traces: int
 ) -> None:
     """A map as a JPEG was explained a little better in each of six turns, and much worse by its fit."""

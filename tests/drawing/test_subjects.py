@@ -123,7 +123,7 @@ def test_only_allowed_gradients_are_used(paint: Painting, kinds: tuple[str, ...]
     assert [kind for kind in ("linear", "radial") if f"<{kind}Gradient" in result.svg] == [*kinds]
 
 
-def test_shading_without_gradients_is_bands_and_gradients_are_usual() -> None:
+def test_shading_becomes_bands_where_gradients_are_not_allowed() -> None:
     flat, usual = made("flat"), made("auto")
     assert len(flat.scene) > len(usual.scene)
     assert flat.score and flat.score.psnr > 25

@@ -6,7 +6,7 @@ import os
 
 from tests import ROOT
 
-SETTINGS = {
+SETTINGS: dict[str, dict[str, str]] = {
     "native": {},
     "without AVX-512": {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL"},
     "old processor": {

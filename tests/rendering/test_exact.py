@@ -21,8 +21,8 @@ from warpsplat.svg.write import GRIDS, rounded, write_svg
 FILL, STROKE = Kind.FILL, Kind.STROKE
 CUBIC, SPLINE = CURVES
 CASES = [
-    *((FILL, CUBIC, n, scale) for n, scale in ((2, 1.0), (4, 0.7), (6, 2.0), (3, 1.0))),
-    *((STROKE, CUBIC, n, scale) for n, scale in ((3, 1.0), (2, 1.3))),
+    *((FILL, CUBIC, n, scale) for n, scale in ((1, 1.0), (2, 1.6), (4, 0.7), (6, 2.0), (3, 1.0))),
+    *((STROKE, CUBIC, n, scale) for n, scale in ((3, 1.0), (2, 1.3), (5, 1.6))),
     *((FILL, SPLINE, n, scale) for n, scale in ((3, 1.3), (5, 1.0), (8, 0.7), (12, 2.0))),
     *((STROKE, SPLINE, n, scale) for n, scale in ((1, 1.3), (2, 1.0), (3, 0.7), (8, 2.0))),
 ]

@@ -46,7 +46,7 @@ def size_of(change: Change | None) -> float:
     return change.size
 
 
-def test_a_file_with_a_surplus_is_cut_and_one_that_lacks_grows(scene: Scene) -> None:
+def test_a_file_better_than_its_goal_shrinks_and_a_worse_one_grows(scene: Scene) -> None:
     settings = goal(target_psnr=27.0)
     small = size_of(next_change([made(scene, 10_000, 27.1)], settings))
     smaller = size_of(next_change([made(scene, 10_000, 27.2)], settings))

@@ -208,7 +208,7 @@ def test_a_strip_along_the_border_is_as_wide_as_its_pixels_show() -> None:
     assert middle[-1] == cells[0, 0] != middle[-2]
 
 
-def test_thin_lines_of_a_large_image_are_as_fine() -> None:
+def test_thin_lines_are_as_fine_in_a_large_image() -> None:
     """Cells are at borders alone, so that the rest of an image has no part in how many lie along a pixel."""
     image = levels(draw_exactly(ground("#ffffff") + '<path d="M9 80 80 9" stroke="#123" stroke-width=".8"/>'))
     large = np.full((1100, 1100, 4), 255, np.float32)

@@ -45,7 +45,7 @@ def test_ink_is_told_from_paper(kind: str) -> None:
     assert kind != "plain" or np.abs(ink.cover - share).max() < 0.1
 
 
-def test_a_partly_covered_edge_is_measured_although_ink_is_broad() -> None:
+def test_partly_covered_edges_of_broad_ink_are_measured() -> None:
     image = drawn('<path d="M20.25 12H60V60H20.25z" fill="#000" stroke="none"/><path d="M70 5V60"/>')
     areas = split(find_ink(image), mixed=True).areas
     assert areas is not None

@@ -227,7 +227,7 @@ def test_a_shadow_that_fades_away_is_kept() -> None:
     assert shown[:8].max() == 0, "nothing is painted where nothing was"
 
 
-def test_a_slope_and_a_map_have_no_noise_but_grain_is() -> None:
+def test_only_grain_counts_as_noise() -> None:
     """Of a map every pixel is beside an edge, and some of its steps are small."""
     rng = np.random.default_rng(0)
     colors = np.array([(90, 30, 20), (100, 120, 30), (110, 150, 60)], np.float32)
