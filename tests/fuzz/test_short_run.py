@@ -1,27 +1,38 @@
-"""A short run of the fuzzer, and proof that it sees faults."""
+"""A run of the fuzzer, and proof that it sees faults."""
 
 from __future__ import annotations
 
+import itertools
+import os
 from pathlib import Path
 
 import pytest
 
 from tests.forks import Forks, Outcome
-from tests.fuzz.cases import TARGETS, Case, Cases, Command, judge, lay_out, run_case
+from tests.fuzz.cases import TARGETS, Case, Command, cases_of, judge, lay_out, run_case
 
 pytestmark = pytest.mark.slow
 
-SEED = 21
-COUNTS = {"image": 60, "svg": 40, "yaml": 50}
+SEED = os.environ.get("FUZZ_SEED", "21")
+COUNTS = {
+    target: int(os.environ.get("FUZZ", count)) for target, count in (("image", 60), ("svg", 40), ("yaml", 50))
+}
+"""Cases of each kind; ``FUZZ``: of a longer run."""
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_no_input_breaks_the_command_line(forks: Forks, tmp_path: Path, target: str) -> None:
-    cases, codes = Cases(SEED, target), []
-    for number in range(COUNTS[target]):
-        for outcome, fault in run_case(forks, cases[number], tmp_path / "deep" / "down" / "case"):
-            assert not fault
+    """The first 20 faults are shown; the input of each is kept beside its number."""
+    codes, faults = list[int](), list[str]()
+    for case in itertools.islice(cases_of(target, SEED), COUNTS[target]):
+        for outcome, fault in run_case(forks, case, tmp_path / "deep" / "down" / "case"):
             codes.append(outcome.code)
+            if fault:
+                faults.append(fault)
+                (tmp_path / f"{case.index}-{case.name}").write_bytes(case.data)
+        if len(faults) >= 20:
+            break
+    assert not faults, "\n".join(map(ascii, faults))
     if target in ("image", "svg"):
         assert codes.count(0) > len(codes) / 20, "otherwise only the first checks are tested"
 
