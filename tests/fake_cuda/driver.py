@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 import os
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,8 +19,8 @@ from tests.fake_cuda.memory import FREED, NEW, Block
 from tests.fake_cuda.rules import report
 from tests.fake_cuda.streams import (
     CAPTURE_IMPLICIT,
+    CAPTURE_INVALIDATED,
     CAPTURE_UNSUPPORTED,
-    CAPTURE_WRONG_THREAD,
     ILLEGAL_ADDRESS,
     INVALID_IMAGE,
     INVALID_VALUE,
@@ -170,9 +169,6 @@ class Driver:
     def wp_cuda_context_pop_current(self) -> None:
         self.thread.context = self.thread.stack.pop()
 
-    def wp_cuda_context_get_device_ordinal(self, context: int | None) -> int:
-        return (context or CONTEXT) - CONTEXT
-
     def wp_cuda_context_check(self, context: int) -> int:
         return self.machine.failed
 
@@ -201,9 +197,6 @@ class Driver:
             self.machine.wait_for(stream, self.machine.now())
             del self.machine.streams[handle]
 
-    def wp_cuda_stream_is_blocking(self, handle: int) -> int:
-        return int(self.stream(handle).blocking)
-
     def wp_cuda_context_set_stream(self, context: int, handle: int | None, sync: int) -> None:
         old = self.current.get(context - CONTEXT)
         self.current[context - CONTEXT] = handle or 0
@@ -214,19 +207,12 @@ class Driver:
         self.machine.finish(self.stream(handle))
         return True
 
-    def wp_cuda_stream_query(self, handle: int) -> int:
-        return 600 if self.stream(handle).queue else 0
-
     def wp_cuda_stream_is_capturing(self, handle: int) -> int:
         return int(self.stream(handle).capture is not None)
 
     def wp_cuda_stream_get_capture_id(self, handle: int) -> int:
         capture = self.stream(handle).capture
         return capture.id if capture else 0
-
-    def wp_cuda_stream_wait_stream(self, handle: int, other: int, event: int, external: bool) -> None:
-        self.wp_cuda_event_record(event, other, external)
-        self.wp_cuda_stream_wait_event(handle, event, external)
 
     def wp_cuda_stream_wait_event(self, handle: int, event: int, external: bool) -> None:
         self.machine.let_wait(self.stream(handle), self.events[event])
@@ -240,20 +226,8 @@ class Driver:
         self.events.pop(event, None)
 
     def wp_cuda_event_record(self, event: int, handle: int, external: bool) -> bool:
-        self.events[event] = Event(self.stream(handle), self.machine.now(), time.perf_counter())
+        self.events[event] = Event(self.stream(handle), self.machine.now())
         return True
-
-    def wp_cuda_event_synchronize(self, event: int) -> bool:
-        recorded = self.events[event]
-        if recorded.stream:
-            if recorded.stream.capture:
-                self.machine.invalidate(CAPTURE_UNSUPPORTED)
-            self.machine.wait_for(recorded.stream, recorded.number)
-        self.machine.check_context()
-        return True
-
-    def wp_cuda_event_elapsed_time(self, begin: int, end: int) -> float:
-        return 1e3 * (self.events[end].time - self.events[begin].time)
 
     # Memory
 
@@ -271,7 +245,8 @@ class Driver:
     def wp_alloc_device_default(self, context: int, size: int, tag: Any) -> int:
         self.enter(context)
         self.machine.check_context()
-        self.machine.forbid_in_capture()
+        if self.machine.captures:
+            self.machine.invalidate(CAPTURE_UNSUPPORTED)
         return self.allocate(size).address
 
     def wp_alloc_device_async(self, context: int, size: int, handle: int, tag: Any) -> int:
@@ -316,12 +291,6 @@ class Driver:
     def wp_free_device_default(self, context: int, address: int) -> None:
         self.free(address, finish=True)
 
-    def wp_alloc_pinned(self, size: int, tag: Any) -> int:
-        return int(self.real.wp_alloc_host(size, None))
-
-    def wp_free_pinned(self, address: int) -> None:
-        self.real.wp_free_host(address)
-
     def wp_memcpy_h2d(self, context: int, to: int, source: int, size: int, handle: int) -> bool:
         self.enter(context)
         self.check("wp_memcpy_h2d", (to, size, "target"))
@@ -345,13 +314,6 @@ class Driver:
         self.machine.check_context()
         return True
 
-    def wp_memcpy_d2d(self, context: int, to: int, source: int, size: int, handle: int) -> bool:
-        self.enter(context)
-        self.check("wp_memcpy_d2d", (to, size, "target"), (source, size, "source"))
-        shift = self.shift
-        self.machine.submit(self.stream(handle), lambda: ctypes.memmove(to + shift, source + shift, size))
-        return True
-
     def wp_memset_device(self, context: int, to: int, value: int, size: int, handle: int) -> bool:
         self.enter(context)
         self.check("wp_memset_device", (to, size, "target"))
@@ -364,33 +326,7 @@ class Driver:
         data = ctypes.string_at(ctypes.cast(source, ctypes.c_void_p), size) * count
         self.machine.submit(self.stream(CURRENT), lambda: ctypes.memmove(to + self.shift, data, len(data)))
 
-    def wp_array_copy_device(self, context: int, to: Any, source: Any, *rest: int) -> bool:
-        self.enter(context)
-        arrays = [type(array.contents).from_buffer_copy(array.contents) for array in (to, source)]
-        for array in arrays:
-            self.machine.region.show(array)
-        pointers = [ctypes.pointer(array) for array in arrays]
-        copy = self.real.wp_array_copy_host
-        self.machine.submit(self.stream(CURRENT), lambda: copy(*pointers, *rest))
-        return True
-
-    def wp_array_fill_device(self, context: int, array: Any, kind: int, value: Any, size: int) -> None:
-        self.enter(context)
-        target = type(array.contents).from_buffer_copy(array.contents)
-        self.machine.region.show(target)
-        to = ctypes.pointer(target)
-        what = ctypes.pointer(type(value.contents).from_buffer_copy(value.contents))
-        fill = self.real.wp_array_fill_host
-        self.machine.submit(self.stream(CURRENT), lambda: fill(to, kind, what, size))
-
-    # Scans and sorts, which take scratch memory
-
-    def scratch(self) -> Stream:
-        """Return the current stream, unless scratch memory cannot be had."""
-        stream = self.stream(CURRENT)
-        if stream.capture and not options.pools:
-            self.machine.invalidate(CAPTURE_UNSUPPORTED)
-        return stream
+    # Scans and sorts
 
     def wp_array_scan_int_device(
         self, source: int, to: int, count: int, step: int, to_step: int, length: int, inclusive: bool
@@ -403,7 +339,7 @@ class Driver:
             sums = np.cumsum(typed(source, count, np.int32), dtype=np.int32)
             typed(to, count, np.int32)[:] = sums if inclusive else np.append(np.int32(), sums[:-1])
 
-        self.machine.submit(self.scratch(), work)
+        self.machine.submit(self.stream(CURRENT), work)
         return True
 
     def wp_radix_sort_pairs_int_device(
@@ -421,7 +357,7 @@ class Driver:
             for half in (key[count:], value[count:]):  # CUB leaves what it likes there
                 half.view(np.uint32)[:] = FREED
 
-        self.machine.submit(self.scratch(), work)
+        self.machine.submit(self.stream(CURRENT), work)
 
     # Modules and kernels
 
@@ -495,7 +431,7 @@ class Driver:
         stream = self.stream(handle)
         if options.fail == "capture" or stream.handle == 0 or stream.capture:
             raise CudaError(CAPTURE_UNSUPPORTED)
-        stream.capture = Capture(next(self.machine.handles), mode, threading.get_ident())
+        stream.capture = Capture(next(self.machine.handles))
         self.machine.captures[stream.capture.id] = stream.capture
         return True
 
@@ -510,10 +446,8 @@ class Driver:
                 if not block.capture:
                     self.release(block, finish=False)
             self.after_capture.clear()
-        if capture.mode != 2 and capture.thread != threading.get_ident():
-            raise CudaError(CAPTURE_WRONG_THREAD)
         if capture.invalid:
-            raise CudaError(901)
+            raise CudaError(CAPTURE_INVALIDATED)
         graph._obj.value = next(self.machine.handles)
         self.graphs[graph._obj.value] = capture.work
         return True
@@ -558,7 +492,7 @@ ANSWERS: dict[str, Any] = {
         [
             f"wp_cuda_{name}"
             for name in (
-                *("event_query", "stream_get_priority", "get_kernel_static_shared_memory", "timing_begin"),
+                *("stream_get_priority", "get_kernel_static_shared_memory", "timing_begin"),
                 *("is_peer_access_supported", "device_is_ipc_supported", "device_get_mempool_used_mem_high"),
                 *("device_get_pci_domain_id", "device_get_pci_bus_id", "device_get_pci_device_id"),
                 *("device_get_pageable_memory_access", "device_get_host_native_atomic_supported"),

@@ -4,13 +4,12 @@ Work is numbered as it is submitted. A stream does its work in that order, and o
 it. The work of the legacy default stream waits for what blocking streams were given before, and theirs for
 its (CUDA Runtime API, "Stream synchronization behavior"). A stream that waits for an event waits for what the
 other stream had been given when it was recorded. What a capture forbids: CUDA Programming Guide, "Prohibited
-and Unhandled Operations"; what is unsafe in which mode: ``cudaThreadExchangeStreamCaptureMode``.
+and Unhandled Operations".
 """
 
 from __future__ import annotations
 
 import itertools
-import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from tests.fake_cuda.rules import report
 
 Work = Callable[[], None]
 
-CAPTURE_UNSUPPORTED, CAPTURE_INVALIDATED, CAPTURE_IMPLICIT, CAPTURE_WRONG_THREAD = 900, 901, 906, 908
+CAPTURE_UNSUPPORTED, CAPTURE_INVALIDATED, CAPTURE_IMPLICIT = 900, 901, 906
 ILLEGAL_ADDRESS, LAUNCH_FAILURE, INVALID_VALUE, OUT_OF_MEMORY, INVALID_IMAGE = 700, 719, 1, 2, 200
 """CUDA's error codes."""
 
@@ -33,11 +32,7 @@ WORDS = {
     CAPTURE_UNSUPPORTED: "operation not permitted when stream is capturing",
     CAPTURE_INVALIDATED: "operation failed due to a previous error during capture",
     CAPTURE_IMPLICIT: "operation would make the legacy stream depend on a capturing blocking stream",
-    CAPTURE_WRONG_THREAD: "attempt to terminate a thread-local capture sequence from another thread",
 }
-
-GLOBAL, THREAD, RELAXED = range(3)
-"""Modes of a capture."""
 
 
 class CudaError(Exception):
@@ -53,8 +48,6 @@ class Capture:
     """Work that a stream records instead of doing it."""
 
     id: int
-    mode: int
-    thread: int
     work: list[Work] = field(default_factory=list)
     invalid: bool = False
 
@@ -77,7 +70,6 @@ class Event:
 
     stream: Stream | None = None
     number: int = 0
-    time: float = 0.0
 
 
 class Machine:
@@ -127,14 +119,6 @@ class Machine:
         """Refuse the legacy stream while a blocking stream is capturing."""
         if stream.handle == 0 and any(other.capture and other.blocking for other in self.streams.values()):
             self.invalidate(CAPTURE_IMPLICIT)
-
-    def forbid_in_capture(self) -> None:
-        """Refuse what is unsafe: while this thread is capturing, unless relaxed, or another one globally."""
-        here = threading.get_ident()
-        for capture in self.captures.values():
-            if capture.mode == RELAXED or (capture.mode == THREAD and capture.thread != here):
-                continue
-            self.invalidate(CAPTURE_UNSUPPORTED)
 
     def invalidate(self, code: int) -> None:
         """Make all captures invalid and fail."""
