@@ -77,6 +77,16 @@ def drawn(image: FloatArray, times: int = 1, **given: str) -> FloatArray:
     return np.asarray(np.asarray(on_white(render_svg(svg, zoom=times))) / 255, np.float32)
 
 
+def noting(sizes: list[tuple[int, ...]]) -> Callable[[FloatArray], Traced]:
+    """Return a function that traces, and notes the sizes of what it is given."""
+
+    def traced(image: FloatArray) -> Traced:
+        sizes.append(image.shape[:2])
+        return trace(image)
+
+    return traced
+
+
 def show(scene: Scene) -> FloatArray:
     return shown_image(finished(scene, make_settings(), DRAFT_GRID / SCALE), scene, 3)
 
@@ -110,13 +120,8 @@ def test_linear_light_is_given_up_after_two_turns_without_gain(
     """A map as a JPEG was explained a little better in each of six turns, and much worse by its fit."""
     costs = iter([105.0, 100.0, 103.0, 102.0, second, 97.0, 98.0])
     monkeypatch.setattr(without_optics_module, "_cost", lambda *_: next(costs))
-    seen, traced = pixels(in_linear_light()), list[Traced]()
-
-    def counted(each: FloatArray) -> Traced:
-        traced.append(trace(each))
-        return traced[-1]
-
-    result = without_optics(seen, 0.0, counted, show, lambda: False).pixels
+    seen, traced = pixels(in_linear_light()), list[tuple[int, ...]]()
+    result = without_optics(seen, 0.0, noting(traced), show, lambda: False).pixels
     assert len(traced) == traces and (result is seen) == (second > 100)
 
 
@@ -192,13 +197,8 @@ def test_plain_and_unsmoothed_images_have_no_kernel() -> None:
 
 @pytest.mark.parametrize(("how", "is_late"), [(None, False), ("blurred", True)])
 def test_images_without_optics_or_time_are_traced_once(how: str | None, is_late: bool) -> None:
-    image, traced = pixels(MADE[how]() if how else small(BOX)), list[Traced]()
-
-    def once(each: FloatArray) -> Traced:
-        traced.append(trace(each))
-        return traced[-1]
-
-    result = without_optics(image, None, once, show, lambda: is_late).pixels
+    image, traced = pixels(MADE[how]() if how else small(BOX)), list[tuple[int, ...]]()
+    result = without_optics(image, None, noting(traced), show, lambda: is_late).pixels
     assert result is image and len(traced) == 1
 
 
@@ -210,14 +210,9 @@ def test_a_part_of_a_large_picture_tells_whether_there_is_a_kernel(monkeypatch: 
     result = without_optics(blurred, None, trace, show, bool).pixels
     assert decibels(result, pixels(small(BOX))) > decibels(blurred, pixels(small(BOX))) + 4
     traced = list[tuple[int, ...]]()
-
-    def counted(each: FloatArray) -> Traced:
-        traced.append(each.shape[:2])
-        return trace(each)
-
     odd = pixels(small(BOX)).copy()
     odd[40:70, 4:34] = (np.arange(30) % 2)[:, None]
-    result = without_optics(odd, None, counted, show, bool).pixels
+    result = without_optics(odd, None, noting(traced), show, bool).pixels
     assert result is odd
     assert traced == [(SIDE, SIDE), (40, 40), (40, 40)], "then the part, as it is and without a kernel"
 
