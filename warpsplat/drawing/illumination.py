@@ -9,7 +9,7 @@ import numpy as np
 from warpsplat.drawing.trace.grids import Bools, Floats, channel_max
 from warpsplat.drawing.trace.regions import MOST_NOISE
 from warpsplat.fit.optics import Illumination
-from warpsplat.portable.filters import boxed, gaussian_blur
+from warpsplat.portable.filters import boxed
 from warpsplat.portable.linear import product, solve
 from warpsplat.scene import FloatArray
 
@@ -40,12 +40,15 @@ LEAST_PAPER, BRIGHT_PAPER = 0.25, 128.0
 LEAST_SHADE = 0.4
 """How dark shadows on the ground are, over the ground in light."""
 
+DARKEST = 1 / 16
+"""Least light that is undone, over the greatest: beyond the paper a polynomial goes anywhere."""
+
 CLEARLY = 0.75
 """Share of the squared error of an even ground that uneven light must leave less than."""
 
 
 def find_illumination(image: FloatArray) -> Illumination | None:
-    """Return the light on the paper of a scan, or of a photograph of paper; None: it is even, or there is none.
+    """Return the light on the paper of a scan or a photograph of one; None: it is even, or there is none.
 
     Paper is bright, lies around what is drawn and has a texture, which gradients that were drawn have not;
     light changes it by the same factor in all channels.
@@ -76,12 +79,14 @@ def find_illumination(image: FloatArray) -> Illumination | None:
 
 def evened(image: FloatArray, illumination: Illumination) -> FloatArray:
     """Return an image, sRGB in [0, 1], as in even light, in whole levels."""
-    return np.asarray(np.clip(np.round(image * 255 / relative(illumination, image)), 0, 255) / np.float32(255))
+    levels = np.round(image * np.float32(255) / relative(illumination, image))
+    return np.asarray(np.minimum(levels, 255) / np.float32(255))
 
 
-def relative(illumination: Illumination, image: FloatArray) -> Floats:
+def relative(illumination: Illumination, image: FloatArray) -> FloatArray:
     """Return the light on an image, over the greatest on its paper, shape (height, width, 3)."""
-    return np.maximum(_at(np.array(illumination).T, image.shape[:2]), np.float32(1 / 16))
+    light = _at(np.array(illumination).T, image.shape[:2])
+    return np.asarray(np.maximum(light, np.float32(DARKEST)), np.float32)
 
 
 def frame(shape: tuple[int, ...]) -> Bools:

@@ -69,7 +69,7 @@ class Picture:
         Args:
             image: sRGB in [0, 1], or premultiplied with opacity.
             is_soft: Leave what interpolation and uneven light made of it.
-            illumination: To be undone in any case.
+            illumination: To be undone in any case, unless it has opacity.
         """
         factor = _enlargement(image)
         before = None if is_soft or factor > 1 else before_enlarging(np.round(image * np.float32(255)))
@@ -79,7 +79,7 @@ class Picture:
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
         if illumination is None and not is_soft:
             illumination = find_illumination(small)
-        if illumination:
+        if illumination and small.shape[2] == len(illumination):
             small = evened(small, illumination)
         is_halved = has_blurred_colors(small)
         pixels, noise = without_noise(small)

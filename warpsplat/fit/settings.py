@@ -330,7 +330,7 @@ class Settings:
     )
     optics: str = drawing_option(
         "auto",
-        "What a scan, a filter or resizing did to the edges of a drawing, to be undone: auto (found), none, "
+        "What a scan, a filter or resizing did to a drawing, to be undone: auto (found), none, "
         "the light alone (sRGB, linear), or the report.json of a run with --json.",
         pattern=how.PATTERN,
         wanted=how.WANTED,

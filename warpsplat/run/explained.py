@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,24 +29,20 @@ class Explained:
     symmetric kernel, whose weights add up to 1."""
 
     illumination: Illumination | None = None
-    """The light on paper, over the greatest: a polynomial of the second degree for each channel. None: even."""
+    """Coefficients of the light on paper for each channel, as in ``Optics``; None: it is even."""
 
     def words(self) -> str:
         """Return a sentence for people."""
-        middle = 4 * self.kernel[0][0]
-        hows = [
-            word
-            for word, is_so in (
-                ("mixed in linear light", self.light == "linear"),
-                ("blurred", self.light != "linear" and (middle < 1 or not self.illumination)),
-                ("sharpened", self.light != "linear" and middle > 1),
-                ("unevenly lit", self.illumination),
-            )
-            if is_so
-        ]
+        middle, hows = 4 * self.kernel[0][0], list[str]()
+        if self.light == "linear":
+            hows.append("mixed in linear light")
+        elif middle != 1 or not self.illumination:
+            hows.append("sharpened" if middle > 1 else "blurred")
+        if self.illumination:
+            hows.append("unevenly lit")
         return (
-            f"the image looks {' and '.join(hows)}, and is drawn as it was before; treated the same way, the file matches "
-            f"it to {self.psnr:.1f} dB (optics 'none' draws the edges that it has)"
+            f"the image looks {' and '.join(hows)}, and is drawn as it was before; treated the same way, the "
+            f"file matches it to {self.psnr:.1f} dB (optics 'none' draws the image as it is)"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -69,8 +65,9 @@ def explained(made: Fit, problem: Problem) -> Explained:
         tuple(round(weights[max(y, x), min(y, x)], 5) for x in range(RADIUS)) for y in range(RADIUS)
     )
     light = "linear" if seen.edges.is_linear else "sRGB"
-    shown = found.shown * relative(illumination, target) if illumination else found.shown
-    return Explained(psnr_of(shown, target), light, kernel, illumination)
+    if illumination:
+        found = replace(found, shown=found.shown * relative(illumination, target))
+    return Explained(psnr_of(found.shown, target), light, kernel, illumination)
 
 
 def psnr_of(shown: FloatArray, target: FloatArray) -> float:
