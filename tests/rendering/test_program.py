@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import weakref
 from dataclasses import dataclass
 from typing import Any
@@ -87,6 +88,23 @@ def test_an_array_is_bound_to_other_memory(device: str, threads: int) -> None:
         program.run()
         np.testing.assert_array_equal(result.numpy(), [12, 24, 36])
     np.testing.assert_array_equal(slope.numpy(), [1, 2, 3])
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_arrays_are_freed_with_their_program(*, device: str, runs: bool) -> None:
+    """At once: memory of a GPU that waits for the garbage collection is missing in the next run."""
+    arrays = [floats(1, 2, 3, device=device) for _ in range(3)]
+    program = Program(wp.get_device(device))
+    program.launch(affine, 3, Buffers(*arrays), factor=2.0)
+    if runs:
+        program.run()
+    left = [weakref.ref(each) for each in arrays]
+    gc.disable()
+    try:
+        del arrays, program
+        assert not any(each() for each in left)
+    finally:
+        gc.enable()
 
 
 COMPLETE: dict[str, Any] = {"slope": 1, "shift": 2, "factor": 3, "result": 4}

@@ -53,7 +53,7 @@ class Program:
         self.stage = stage
         """Name of the launches that are added from now on, for ``run_timed``."""
         self._launches: list[Launch] = []
-        self._added: list[Callable[[], Launch]] = []
+        self._added: list[Callable[[Program], Launch]] = []
         """Recording of the launches that were added since."""
         # Recorded launches hold addresses only.
         self._arrays: list[Sequence[Any]] = []
@@ -90,7 +90,8 @@ class Program:
         # A split launch is cut finer than there are threads, so that uneven pieces balance.
         pieces_per_thread = 4
         count = min(self.threads * pieces_per_thread, shape[0]) if split and self.threads > 1 else 1
-        self._added.append(functools.partial(self._record, self.stage, kernel, shape, arguments, count))
+        stage = self.stage
+        self._added.append(lambda program: program._record(stage, kernel, shape, arguments, count))
 
     def _record(
         self, stage: str, kernel: wp.Kernel, shape: tuple[int, ...], arguments: list[Any], count: int
@@ -113,7 +114,7 @@ class Program:
     def record(self) -> None:
         """Load the kernels of the launches that were added, and record these."""
         while self._added:
-            self._launches.append(self._added[0]())
+            self._launches.append(self._added[0](self))
             del self._added[0]
 
     @property
@@ -146,7 +147,7 @@ class Program:
     def call(self, function: Callable[..., None], *arguments: Any) -> None:
         """Append a host function that launches device work (a scan, a sort)."""
         launch = Launch(self.stage, function.__name__, (lambda: function(*arguments),))
-        self._added.append(lambda: launch)
+        self._added.append(lambda _: launch)
 
     def run(self) -> None:
         """Replay all launches."""
@@ -297,24 +298,30 @@ def bind(kernel: wp.Kernel, sources: Sequence[object], values: Mapping[str, Any]
         TypeError: a parameter is missing or stands in two sources, or a value is no parameter.
     """
     used: set[str] = set()
-
-    def found(name: str, kind: Any) -> Any:
-        if isinstance(kind, Struct):
-            made = kind()
-            for field, variable in kind.vars.items():
-                setattr(made, field, found(field, variable.type))
-            return made
-        used.add(name)
-        fitting = [values[name]] if name in values else _lookup(name, sources)
-        if len(fitting) != 1:
-            problem = "missing" if not fitting else "ambiguous"
-            raise TypeError(f"{kernel.key}: parameter {name} is {problem}")
-        return fitting[0]
-
-    arguments = [found(argument.label, argument.type) for argument in kernel.adj.args[1:]]
+    try:
+        found = [_value(each.label, each.type, sources, values, used) for each in kernel.adj.args[1:]]
+    except LookupError as error:
+        raise TypeError(f"{kernel.key}: {error.args[0]}") from None
     if unknown := values.keys() - used:
         raise TypeError(f"{kernel.key} has no parameter {', '.join(sorted(unknown))}")
-    return arguments
+    return found
+
+
+def _value(name: str, kind: Any, sources: Sequence[object], values: Mapping[str, Any], used: set[str]) -> Any:
+    """Return the argument for a parameter, and add to ``used`` the names of which it is made.
+
+    No closure, which would be a cycle that keeps the arrays until garbage is collected.
+    """
+    if isinstance(kind, Struct):
+        made = kind()
+        for field, variable in kind.vars.items():
+            setattr(made, field, _value(field, variable.type, sources, values, used))
+        return made
+    used.add(name)
+    fitting = [values[name]] if name in values else _lookup(name, sources)
+    if len(fitting) != 1:
+        raise LookupError(f"parameter {name} is {'missing' if not fitting else 'ambiguous'}")
+    return fitting[0]
 
 
 def _arrays(values: Iterable[Any]) -> Iterator[wp.array]:
