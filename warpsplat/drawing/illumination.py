@@ -31,6 +31,11 @@ LEAST_NOISE = 1.25
 BRIGHT = 252.0
 """Levels from which on the true brightness is not known."""
 
+ALL = slice(None)
+
+STRIP = 64
+"""Rows that are handled together, which bounds the memory."""
+
 MOST_TOLD = 1 << 20
 """Pixels that tell whether light is uneven, about, which bounds time and memory."""
 
@@ -58,9 +63,11 @@ def find_illumination(image: FloatArray) -> Illumination | None:
     """
     if image.shape[2] != 3:
         return None
-    found = fit_field(image * np.float32(255))
-    every = 1 + image[..., 0].size // MOST_TOLD
-    some, field = image[::every] * np.float32(255), field_at(found, image.shape[:2], every)
+    factor = small_factor(image)
+    height, width = (side - side % factor for side in image.shape[:2])
+    found = fit_field(boxed(image[:height, :width], factor) * np.float32(255))
+    rows = slice(None, None, 1 + image[..., 0].size // MOST_TOLD)
+    some, field = image[rows] * np.float32(255), field_at(found, image.shape[:2], rows)
     off = channel_max(np.abs(some - field))
     noise = noise_around(off)
     is_paper = off <= OUTLIERS * noise
@@ -79,13 +86,17 @@ def find_illumination(image: FloatArray) -> Illumination | None:
 
 def evened(image: FloatArray, illumination: Illumination) -> FloatArray:
     """Return an image, sRGB in [0, 1], as in even light, in whole levels."""
-    levels = np.round(image * np.float32(255) / relative(illumination, image))
-    return np.asarray(np.minimum(levels, 255) / np.float32(255))
+    found = np.empty_like(image)
+    for top in range(0, len(image), STRIP):
+        rows = slice(top, top + STRIP)
+        levels = np.round(image[rows] * np.float32(255) / relative(illumination, image, rows))
+        found[rows] = np.minimum(levels, 255) / np.float32(255)
+    return found
 
 
-def relative(illumination: Illumination, image: FloatArray) -> FloatArray:
-    """Return the light on an image, over the greatest on its paper, shape (height, width, 3)."""
-    light = _at(np.array(illumination).T, image.shape[:2])
+def relative(illumination: Illumination, image: FloatArray, rows: slice = ALL) -> FloatArray:
+    """Return the light on some rows of an image, over the greatest on its paper, shape (row, width, 3)."""
+    light = _at(np.array(illumination).T, image.shape[:2], rows)
     return np.asarray(np.maximum(light, np.float32(DARKEST)), np.float32)
 
 
@@ -107,7 +118,7 @@ def fit_field(levels: Floats) -> Floats:
 
     As coefficients of ``_terms``, shape (6, 3). ``levels``: sRGB, 0..255, shape (height, width, 3).
     """
-    small = boxed(np.asarray(levels, np.float32), max(1, min(levels.shape[:2]) // FIELD_SIDE))
+    small = boxed(np.asarray(levels, np.float32), small_factor(levels))
     terms, colors = _terms(small.shape[:2]).reshape(-1, 6), small.reshape(-1, 3).astype(np.float64)
     border, is_bright = frame(small.shape[:2]).reshape(-1), colors >= BRIGHT
     middle = np.median(colors[border], axis=0)
@@ -130,19 +141,21 @@ def fit_field(levels: Floats) -> Floats:
     return np.asarray(found)
 
 
-def field_at(found: Floats, shape: tuple[int, ...], every: int = 1) -> Floats:
-    """Return a field of ``fit_field`` at the pixels of an image [levels], shape (height, width, 3).
-
-    ``every``: which rows, the first one and each that is so many further on.
-    """
-    return np.minimum(_at(found, shape, every), np.float32(255))
+def small_factor(image: Floats) -> int:
+    """Return how many times smaller an image is that a field is fitted to."""
+    return max(1, min(image.shape[:2]) // FIELD_SIDE)
 
 
-def _at(found: Floats, shape: tuple[int, ...], every: int = 1) -> Floats:
+def field_at(found: Floats, shape: tuple[int, ...], rows: slice = ALL) -> Floats:
+    """Return a field of ``fit_field`` on some rows of an image [levels], shape (row, width, 3)."""
+    return np.minimum(_at(found, shape, rows), np.float32(255))
+
+
+def _at(found: Floats, shape: tuple[int, ...], rows: slice) -> Floats:
     """Return polynomials at the pixels of some rows of an image, shape (row, width, polynomial)."""
     y, x = (side.astype(np.float32)[:, None] for side in _sides(shape))
     one, across, down, twice, both, twice_down = found.astype(np.float32)[:, None, None]
-    y = y[::every, None]
+    y = y[rows, None]
     return np.asarray(one + down * y + twice_down * y * y + (across + both * y) * x + twice * (x * x))
 
 
