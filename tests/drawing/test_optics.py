@@ -119,7 +119,7 @@ def test_linear_light_is_given_up_after_two_turns_without_gain(
 ) -> None:
     """A map as a JPEG was explained a little better in each of six turns, and much worse by its fit."""
     costs = iter([105.0, 100.0, 103.0, 102.0, second, 97.0, 98.0])
-    monkeypatch.setattr(without_optics_module, "_cost", lambda *_: next(costs))
+    monkeypatch.setattr(without_optics_module, "cost_of", lambda *_: next(costs))
     seen, traced = pixels(in_linear_light()), list[tuple[int, ...]]()
     result = without_optics(seen, 0.0, noting(traced), show, lambda: False).pixels
     assert len(traced) == traces and (result is seen) == (second > 100)

@@ -14,12 +14,13 @@ from warpsplat.drawing.constraints import DRAFT_GRID, Drawing, Finished
 from warpsplat.drawing.draft import as_fit, byte_price, draw_pixels, limited, trace_in_time
 from warpsplat.drawing.glyph_sheet import GlyphSheet
 from warpsplat.drawing.glyphs import find_glyphs
+from warpsplat.drawing.illumination import find_illumination, relative
 from warpsplat.drawing.optics import NONE, SCALE
 from warpsplat.drawing.picture import Picture
 from warpsplat.drawing.prices import LEAST_ERROR
 from warpsplat.drawing.thin import TRACED_PSNR
 from warpsplat.drawing.trace.regions import smoothed
-from warpsplat.drawing.without_optics import without_optics
+from warpsplat.drawing.without_optics import CLEARLY, cost_of, without_optics
 from warpsplat.errors import counted
 from warpsplat.fit.export import finished, shown_image
 from warpsplat.fit.optics import Optics
@@ -40,6 +41,9 @@ SECONDS_PER_WRITTEN = 6e-5
 
 LONG = 4.0
 """Time from which on it is announced [s]."""
+
+GRADIENT_BYTES = 200
+"""What a gradient takes in a file that says as much of the ground as its light, about."""
 
 DEARER, TRIES = 8.0, 9
 """The factor from one price of a byte to the next, and how many are tried, to draw within a size."""
@@ -77,6 +81,8 @@ def draw_regions(problem: Problem, run: Run) -> Fit:
     picture = Picture.of(problem.target, is_soft=is_soft, illumination=known.illumination)
     price = byte_price(settings)
     announce_trace(picture, settings)
+    if not (is_soft or known.illumination):
+        picture = _in_even_light(picture, problem.target, settings, run, most)
     picture, found = _sharp(picture, settings, run, most)
     if not run.over():
         announce_fit(sum(len(part.joints) for part in (found.drawing, found.glyphs) if part) // 3, settings)
@@ -160,6 +166,26 @@ def _traced(
             return _Trace(others, rest, scene, sheet, Drawing(glyphs.scene, glyphs.joints))
     drawing = trace(picture.pixels, most)
     return _Trace(drawing, picture.pixels, drawing.scene)
+
+
+def _in_even_light(
+    picture: Picture, target: FloatArray, settings: Settings, run: Run, most: int | None
+) -> Picture:
+    """Return the picture of an image in even light, if its trace explains the image clearly better so."""
+    found = find_illumination(target)
+    if found is None or run.over():
+        return picture
+
+    def cost(picture: Picture) -> float:
+        scene = picture.placed(_traced(picture, settings, run, most, byte_price(settings)).scene)
+        shown = shown_image(finished(scene, settings, DRAFT_GRID), scene, target.shape[2])
+        if picture.illumination:
+            shown = shown * relative(picture.illumination, target)
+        error = float(np.square((shown - target) * 255, dtype=np.float64).sum())
+        return cost_of(error, scene, GRADIENT_BYTES if picture.illumination else 0)
+
+    even = Picture.of(target, illumination=found)
+    return even if cost(even) < cost(picture) + 10 * float(elementary.log10(CLEARLY)) else picture
 
 
 def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, _Trace]:

@@ -42,21 +42,21 @@ MOST_TOLD = 1 << 20
 LEAST_PAPER, BRIGHT_PAPER = 0.25, 128.0
 """Share of the image that is paper, at the least, and its mean level in the best light."""
 
-LEAST_SHADE = 0.4
-"""How dark shadows on the ground are, over the ground in light."""
+LEAST_TEXTURE = 2.0
+"""How far pixels of paper are off its light [levels]: gradients as JPEG are, by a level."""
 
-DARKEST = 1 / 16
-"""Least light that is undone, over the greatest: beyond the paper a polynomial goes anywhere."""
+LEAST_LIGHT = 0.2
+"""Light on the darkest part of paper, over the greatest."""
 
-CLEARLY = 0.75
+UNEVEN = 0.75
 """Share of the squared error of an even ground that uneven light must leave less than."""
 
 
 def find_illumination(image: FloatArray) -> Illumination | None:
-    """Return the light on the paper of a scan or a photograph of one; None: it is even, or there is none.
+    """Return the light that may be on the paper of a scan or a photograph of one; None: it is even.
 
-    Paper is bright, lies around what is drawn and has a texture, which gradients that were drawn have not;
-    light changes it by the same factor in all channels.
+    Paper is bright, lies around what is drawn and has a texture, which hardly any gradient that was drawn
+    has: what a trace explains in this light must tell.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3).
@@ -75,11 +75,10 @@ def find_illumination(image: FloatArray) -> Illumination | None:
         return None
     paper, light = some[is_paper].astype(np.float64), field[is_paper].astype(np.float64)
     greatest = light.max(axis=0)
-    if greatest.mean() < BRIGHT_PAPER or (field / greatest).min() < LEAST_SHADE:
+    if greatest.mean() < BRIGHT_PAPER or (field / greatest).min() < LEAST_LIGHT:
         return None
     texture, even = np.square(paper - light).mean(), np.square(paper - paper.mean(axis=0)).mean()
-    is_tinted = np.ptp(light / greatest, axis=1).max() * 255 > OUTLIERS * noise
-    if texture < 1 or texture >= CLEARLY * even or is_tinted:
+    if texture < LEAST_TEXTURE**2 or texture >= UNEVEN * even:
         return None
     return tuple(tuple(each) for each in (found / greatest).T.tolist())
 
@@ -97,7 +96,7 @@ def evened(image: FloatArray, illumination: Illumination) -> FloatArray:
 def relative(illumination: Illumination, image: FloatArray, rows: slice = ALL) -> FloatArray:
     """Return the light on some rows of an image, over the greatest on its paper, shape (row, width, 3)."""
     light = _at(np.array(illumination).T, image.shape[:2], rows)
-    return np.asarray(np.maximum(light, np.float32(DARKEST)), np.float32)
+    return np.asarray(np.maximum(light, np.float32(LEAST_LIGHT)), np.float32)
 
 
 def frame(shape: tuple[int, ...]) -> Bools:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from warpsplat.drawing.chroma import has_blurred_colors, with_sharp_colors
 from warpsplat.drawing.denoise import without_noise
-from warpsplat.drawing.illumination import evened, find_illumination
+from warpsplat.drawing.illumination import evened
 from warpsplat.drawing.reduced import before_enlarging
 from warpsplat.drawing.thin import THIN_SIDE, margins
 from warpsplat.drawing.trace.pixels import cell_size
@@ -68,8 +68,8 @@ class Picture:
 
         Args:
             image: sRGB in [0, 1], or premultiplied with opacity.
-            is_soft: Leave what interpolation and uneven light made of it.
-            illumination: To be undone in any case, unless it has opacity.
+            is_soft: Leave what interpolation made of it.
+            illumination: To be undone, unless it has opacity.
         """
         factor = _enlargement(image)
         before = None if is_soft or factor > 1 else before_enlarging(np.round(image * np.float32(255)))
@@ -77,8 +77,6 @@ class Picture:
         repeated = np.ascontiguousarray(image[::factor, ::factor])
         small = repeated if before is None else before / np.float32(255)
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
-        if illumination is None and not is_soft:
-            illumination = find_illumination(small)
         if illumination and small.shape[2] == len(illumination):
             small = evened(small, illumination)
         is_halved = has_blurred_colors(small)

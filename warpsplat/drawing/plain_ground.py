@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from warpsplat.drawing.illumination import LEAST_SHADE, OUTLIERS, field_at, fit_field, frame, noise_around
+from warpsplat.drawing.illumination import OUTLIERS, field_at, fit_field, frame, noise_around
 from warpsplat.drawing.trace.grids import Bools, Floats, channel_max, dilated, eroded
 from warpsplat.portable.filters import gaussian_blur, sobel
 
-BRIGHTEST = 1.25
-"""How bright spots of light are, over the ground in light."""
+LEAST_SHADE, BRIGHTEST = 0.4, 1.25
+"""How dark soft shadows are, over the ground in light, and how bright spots of light."""
 
 HUE = 12.0
 """How far the colour of a shadow is off that of darker ground [levels]: light from elsewhere tints it."""

@@ -128,13 +128,13 @@ def _undone(
     def look(traced: Traced) -> tuple[Found, float]:
         """Return the optics of the trace, and what its error and its size cost with them [dB]."""
         found = seen.find(*(show(scene) for scene in seen.scenes(traced.scene)))
-        return found, _cost(found.error, traced.scene)
+        return found, cost_of(found.error, traced.scene)
 
     if over():
         return first
     best = first
     found, _ = look(first.traced)
-    usual = math.inf if is_certain else _cost(found.without, first.traced.scene)
+    usual = math.inf if is_certain else cost_of(found.without, first.traced.scene)
     bound = clearly = usual + 10 * float(log10(CLEARLY))
     if seen.edges.has_rings or seen.edges.is_linear:
         plain = seen.plain()
@@ -167,7 +167,7 @@ def _busiest(edges: Bools) -> Box:
     return Box(int(left), int(top), int(left) + width, int(top) + height)
 
 
-def _cost(error: float, scene: Scene) -> float:
-    """Return what an error and the bytes of a scene cost [dB]."""
-    size = estimated_size(scene, DRAFT_GRID)
+def cost_of(error: float, scene: Scene, more: int = 0) -> float:
+    """Return what a squared error [levels squared] and the bytes of a scene, and ``more``, cost [dB]."""
+    size = estimated_size(scene, DRAFT_GRID) + more
     return 10 * float(log10(max(error, 1))) + DB_PER_DOUBLING * float(log10(size)) / float(log10(2))
