@@ -85,6 +85,14 @@ def test_a_gradient_with_grain_stays() -> None:
     assert made.optics is None or made.optics.illumination is None
 
 
+def test_illumination_of_images_with_opacity_is_not_undone() -> None:
+    image = np.dstack([page(), np.ones((SIDE, SIDE, 1), np.float32)])
+    image[:8, :8] = 0
+    optics = {"illumination": [[1.0, 0.1, 0.0, 0.0, 0.0, 0.0]] * 3}
+    made = warpsplat.vectorize(image, subject="drawing", quality="draft", optics=optics)
+    assert made.optics is None or made.optics.illumination is None
+
+
 def test_illumination_of_a_report() -> None:
     rows = [[1.0, 0.1, 0.0, 0.0, 0.0, -0.2]] * 3
     text = parse_optics({"illumination": rows})

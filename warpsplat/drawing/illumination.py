@@ -108,7 +108,7 @@ def frame(shape: tuple[int, ...]) -> Bools:
 
 
 def noise_around(off: Floats) -> float:
-    """Return the noise of a ground by how far smoothed pixels are off its field, shape (height, width)."""
+    """Return the noise of a ground by how far pixels are off its field [levels], shape (height, width)."""
     return max(LEAST_NOISE, 1.5 * float(np.median(off[frame(off.shape)])))
 
 

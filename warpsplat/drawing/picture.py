@@ -77,7 +77,9 @@ class Picture:
         repeated = np.ascontiguousarray(image[::factor, ::factor])
         small = repeated if before is None else before / np.float32(255)
         enlargement = np.array(image.shape[1::-1]) / small.shape[1::-1]
-        if illumination and small.shape[2] == len(illumination):
+        if small.shape[2] == 4:
+            illumination = None
+        if illumination:
             small = evened(small, illumination)
         is_halved = has_blurred_colors(small)
         pixels, noise = without_noise(small)
