@@ -171,21 +171,30 @@ def _traced(
 def _in_even_light(
     picture: Picture, target: FloatArray, settings: Settings, run: Run, most: int | None
 ) -> Picture:
-    """Return the picture of an image in even light, if its trace explains the image clearly better so."""
+    """Return the picture of an image in even light, if its trace explains the image better so.
+
+    More of it in fewer bytes, or clearly better for its bytes.
+    """
     found = find_illumination(target)
     if found is None or run.over():
         return picture
 
-    def cost(picture: Picture) -> float:
-        scene = picture.placed(_traced(picture, settings, run, most, byte_price(settings)).scene)
+    def look(picture: Picture) -> tuple[float, float]:
+        """Return the squared error of a trace, and what this and its size cost [dB]."""
+        # Neither apart nor smoothed: letters that no optics have made sharp yet would be far off in any case.
+        rough = replace(picture, is_halved=False)
+        traced = _traced(rough, settings, run, most, byte_price(settings), has_sheet=False)
+        scene = picture.placed(traced.scene)
         shown = shown_image(finished(scene, settings, DRAFT_GRID), scene, target.shape[2])
         if picture.illumination:
             shown = shown * relative(picture.illumination, target)
         error = float(np.square((shown - target) * 255, dtype=np.float64).sum())
-        return cost_of(error, scene, GRADIENT_BYTES if picture.illumination else 0)
+        return error, cost_of(error, scene, GRADIENT_BYTES if picture.illumination else 0)
 
     even = Picture.of(target, illumination=found)
-    return even if cost(even) < cost(picture) + 10 * float(elementary.log10(CLEARLY)) else picture
+    (error, cost), (usual_error, usual) = look(even), look(picture)
+    clearly = usual + 10 * float(elementary.log10(CLEARLY))
+    return even if cost < (usual if error < usual_error else clearly) else picture
 
 
 def _sharp(picture: Picture, settings: Settings, run: Run, most: int | None) -> tuple[Picture, _Trace]:
