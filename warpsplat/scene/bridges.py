@@ -8,7 +8,7 @@ import numpy as np
 
 from warpsplat.portable import elementary
 from warpsplat.scene.connected import parts_of
-from warpsplat.scene.cutout import difference
+from warpsplat.scene.cutout import difference, near_rings
 from warpsplat.scene.scene import Floats, Scene
 from warpsplat.scene.simple import free_fills, least_area, merged, polygon, polygon_ring, with_rings
 
@@ -25,7 +25,8 @@ def bridged(scene: Scene, per_pixel: float, width: float) -> Scene:
         left = [outer, *holes]
         for hole in holes:
             for bridge in _bridges(polygon(hole), polygon(outer), width * per_pixel):
-                left = difference(left, [bridge], least)
+                near, far = near_rings(left, [bridge])
+                left = [*far, *difference(near, [bridge], least)]
         made[shape] += left
     return with_rings(scene, made, per_pixel)
 

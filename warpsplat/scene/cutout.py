@@ -42,14 +42,14 @@ def cut_out(scene: Scene, per_pixel: float) -> Scene:
         rings = merged(scene, shape, per_pixel)
         if any((ring.min(axis=(0, 1)) < 0).any() or (ring.max(axis=(0, 1)) > size).any() for ring in rings):
             rings = intersection(rings, page, least)
-        near, far = _near(above, rings)
+        near, far = near_rings(above, rings)
         made[shape] = difference(rings, near, least)
         if scene.opacities[shape] >= 1:
             above = [*far, *union(near, rings, least)]
         if is_solid[shape]:
             front = of_color.setdefault(scene.colors[shape].tobytes(), shape)
             if front != shape:
-                near, far = _near(made[front], made[shape])
+                near, far = near_rings(made[front], made[shape])
                 made[front], made[shape] = [*far, *union(near, made[shape], least)], []
     return with_rings(scene, made, per_pixel)
 
@@ -75,7 +75,7 @@ def difference(rings: list[Floats], others: list[Floats], least: float) -> list[
     return _combined(rings, [reversed_ring(ring) for ring in others], -GROWN, lambda turns: turns > 0, least)
 
 
-def _near(rings: list[Floats], others: list[Floats]) -> tuple[list[Floats], list[Floats]]:
+def near_rings(rings: list[Floats], others: list[Floats]) -> tuple[list[Floats], list[Floats]]:
     """Return the rings whose boxes meet that of the others, and the rest."""
     every = np.concatenate([*others, np.full((0, 4, 2), 0.0)]).reshape(-1, 2)
     if not len(every):
