@@ -43,7 +43,7 @@ LONG = 4.0
 """Time from which on it is announced [s]."""
 
 GRADIENT_BYTES = 200
-"""What a gradient takes in a file that says as much of the ground as its light, about."""
+"""Rough size in a file of a gradient that describes the ground as well as its light does."""
 
 DEARER, TRIES = 8.0, 9
 """The factor from one price of a byte to the next, and how many are tried, to draw within a size."""

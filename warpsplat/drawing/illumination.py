@@ -43,20 +43,20 @@ LEAST_PAPER, BRIGHT_PAPER = 0.25, 128.0
 """Share of the image that is paper, at the least, and its mean level in the best light."""
 
 LEAST_TEXTURE = 2.0
-"""How far pixels of paper are off its light [levels]: gradients as JPEG are, by a level."""
+"""Least noise of paper [levels]: that of a JPEG of a drawn gradient is about one level."""
 
 LEAST_LIGHT = 0.2
-"""Light on the darkest part of paper, over the greatest."""
+"""Light on the darkest part of paper, relative to the brightest."""
 
 UNEVEN = 0.75
 """Share of the squared error of an even ground that uneven light must leave less than."""
 
 
 def find_illumination(image: FloatArray) -> Illumination | None:
-    """Return the light that may be on the paper of a scan or a photograph of one; None: it is even.
+    """Return the uneven light that may be on the paper of a scan or photographed page; None if it is even.
 
-    Paper is bright, lies around what is drawn and has a texture, which hardly any gradient that was drawn
-    has: what a trace explains in this light must tell.
+    Paper is bright, surrounds what is drawn, and has a texture. A drawn gradient may have all that, too:
+    only traces with and without the light tell.
 
     Args:
         image: sRGB in [0, 1], shape (height, width, 3).
@@ -84,7 +84,7 @@ def find_illumination(image: FloatArray) -> Illumination | None:
 
 
 def evened(image: FloatArray, illumination: Illumination) -> FloatArray:
-    """Return an image, sRGB in [0, 1], as in even light, in whole levels."""
+    """Return an image, sRGB in [0, 1], as it would be in even light, in whole levels."""
     found = np.empty_like(image)
     for top in range(0, len(image), STRIP):
         rows = slice(top, top + STRIP)
@@ -94,7 +94,7 @@ def evened(image: FloatArray, illumination: Illumination) -> FloatArray:
 
 
 def relative(illumination: Illumination, image: FloatArray, rows: slice = ALL) -> FloatArray:
-    """Return the light on some rows of an image, over the greatest on its paper, shape (row, width, 3)."""
+    """Return the light on some rows of an image, relative to the brightest paper, shape (row, width, 3)."""
     light = _at(np.array(illumination).T, image.shape[:2], rows)
     return np.asarray(np.maximum(light, np.float32(LEAST_LIGHT)), np.float32)
 

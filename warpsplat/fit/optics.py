@@ -27,10 +27,11 @@ Kernel = tuple[float, ...]
 """A weight for the samples of each of RINGS; those of all samples add up to 1."""
 
 TERMS = 6
-"""Of a polynomial of the second degree in x and y, which go from -1/2 to 1/2: 1, x, y, x², xy, y²."""
+"""Number of terms of a polynomial of the second degree: 1, x, y, x², xy, y², where x and y go from -1/2 to
+1/2 across and down the image."""
 
 Illumination = tuple[tuple[float, ...], ...]
-"""Light on paper, over the greatest: such a polynomial for each of the three channels."""
+"""The light on paper, relative to the brightest spot: coefficients of a polynomial for each channel."""
 
 WORDS = ("auto", "none", *get_args(Light))
 """Values of the option that are words."""
@@ -39,10 +40,10 @@ WANTED = f"{', '.join(WORDS)} or a report.json of --json"
 """Values of the option, in words."""
 
 NUMBER = r"-?\d+(\.\d+)?(e[-+]?\d+)?"
-"""A weight of a kernel as a text."""
+"""Pattern of a number in the text of optics."""
 
 CHANNELS = 3
-"""Of an image that is a scan or a photograph of paper."""
+"""Number of channels of a scan or a photograph of paper."""
 
 PATTERN = (
     rf"{'|'.join(WORDS)}|({'|'.join(get_args(Light))})(( {NUMBER}){{{len(RINGS)}}})?"
@@ -100,7 +101,7 @@ def _text(given: Mapping[str, Any]) -> str:
 
 
 def _numbers(rows: Any, name: str, count: int, length: int) -> list[float]:
-    """Return the numbers of rows of one length."""
+    """Return the numbers in ``count`` rows of ``length`` each; raise ``UsageError`` for anything else."""
     known = [row for row in rows if _is_list(row)] if _is_list(rows) else []
     numbers = [float(each) for row in known for each in row if _is_number(each)]
     if [len(row) for row in known] != [length] * count or len(numbers) != count * length:
